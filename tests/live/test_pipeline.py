@@ -39,7 +39,7 @@ from relit_camera.live.render_quality import FULL_QUALITY, QUALITY_LEVELS, Rende
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.status.camera_status import DegradationCode
 from relit_camera.subject.relighting.relighter import Relighter, open_relighter
-from relit_camera.subject.subject import Subject
+from relit_camera.subject.subject import ANYONE, Subject
 from tests.generated_subject import small_subject
 from tests.small_camera import SIZE, SteadyTracker, difference, grey
 
@@ -53,10 +53,16 @@ def pipeline(tracker: Tracker | None = None, size: tuple[int, int] = SIZE) -> Pi
     return make_pipeline(CPU, tracker or SteadyTracker(), size)
 
 
+def whoever_comes(lighting: dict[str, object] | None = None) -> Scene:
+    look = {} if lighting is None else {"lighting": lighting}
+    return replace(scene(False, Mode.LIVE, False, **look), subject_name=ANYONE)
+
+
 def scene(subject: bool = True, mode: Mode = Mode.PORTRAIT, unlit_allowed: bool = True, **look: object) -> Scene:
     wanted = Look.model_validate({"mode": mode, **look})
     lit = STUDIO if wanted.lighting.environment == "studio" else None
-    return Scene(wanted, lit, None, "small", small_subject() if subject else None, unlit_allowed=unlit_allowed)
+    who = small_subject() if subject else None
+    return Scene(wanted, lit, None, "small" if who else None, who, unlit_allowed=unlit_allowed)
 
 
 def frame(index: int = 0, image: np.ndarray | None = None) -> Frame:
@@ -91,7 +97,7 @@ def test_whoever_comes_is_relit_where_nobody_is_chosen() -> None:
     """In the light that was chosen, at once, and nothing of the head that stands for them is in the picture."""
     made, image = pipeline(), textured()
     bright, dark = (
-        made.process(frame(index, image), scene(subject=False, mode=Mode.LIVE, unlit_allowed=False, lighting=light))
+        made.process(frame(index, image), whoever_comes(lighting=light))
         for index, light in enumerate([LAMP_LEFT.model_dump(), LAMP_RIGHT.model_dump()])
     )
     assert (bright.shown, bright.unlit) == (Shown.RELIT, False)
@@ -101,6 +107,13 @@ def test_whoever_comes_is_relit_where_nobody_is_chosen() -> None:
     assert (right - left)[20:-20, half + 6 : half + 24].mean() > 3
     fine = [each - cv2.GaussianBlur(each, (0, 0), 8) for each in (left, image.astype(float))]
     assert np.corrcoef(*(each[20:-20, half - 40 : half - 16].ravel() for each in fine))[0, 1] > 0.8
+
+
+@pytest.mark.parametrize("mode", list(Mode))
+def test_nobody_chosen_is_nobody_shown(mode: Mode) -> None:
+    assert scene(subject=False, mode=mode, unlit_allowed=False).shows_nobody
+    assert replace(whoever_comes(), look=Look(mode=Mode.PORTRAIT)).shows_nobody
+    assert not whoever_comes().shows_nobody
 
 
 def textured() -> np.ndarray:
@@ -144,7 +157,7 @@ def test_somebody_else_than_the_subject_is_lit_as_anybody_would_be(distance: flo
     assert [trouble.code for trouble in made.troubles] == [DegradationCode.OTHER_PERSON] * other
     as_anybody = pipeline()
     as_anybody._compositor.composite_live = lambda picture, *_: picture  # type: ignore[method-assign]
-    unchosen = replace(chosen, subject=None, unlit_allowed=False)
+    unchosen = replace(chosen, subject=None, subject_name=ANYONE)
     expected = [as_anybody.process(frame(index, textured()), unchosen) for index in range(60)][-1]
     assert (difference(rendered[-1].image, expected.image) < 1) is other
 
@@ -155,7 +168,7 @@ def test_somebody_else_than_the_subject_is_lit_as_anybody_would_be(distance: flo
         (Mode.PORTRAIT, True, "the live picture"),
         (Mode.PORTRAIT, False, "a placeholder"),
         (Mode.LIVE, True, "the live picture"),
-        (Mode.LIVE, False, "you are lit as a mean head"),
+        (Mode.LIVE, False, "a placeholder"),
     ],
 )
 def test_nobody_is_a_trouble(mode: Mode, allowed: bool, shown: str) -> None:
@@ -438,7 +451,8 @@ def test_it_says_when_models_are_opened() -> None:
         said.append("picture")
     made.close()
     opened = ["opening", "picture"]
-    assert said == [*opened, "picture", "opening", *opened, "picture", "picture", *opened, *opened]
+    first_live = ["opening", "opening", *opened]  # who it is, the mode, the matte
+    assert said == [*opened, "picture", *first_live, "picture", "picture", *opened, *opened]
 
 
 def test_it_starts_no_thread() -> None:

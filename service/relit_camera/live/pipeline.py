@@ -36,12 +36,9 @@ __all__ = ["Pipeline", "RenderTask", "RenderedFrame", "subject_troubles"]
 
 def subject_troubles(scene: Scene) -> list[Degradation]:
     """What works less well than asked because nobody is chosen; nothing where somebody is."""
-    if scene.subject is not None:
-        return []
     if not scene.shows_nobody:
-        shown = "you are lit as a mean head would be"
-    else:
-        shown = "the live picture is shown as it is" if scene.unlit_allowed else "a placeholder is shown"
+        return []
+    shown = "the live picture is shown as it is" if scene.unlit_allowed else "a placeholder is shown"
     cure = "choose or capture one in the panel, or name one with --subject"
     return [Degradation(code=DegradationCode.NO_SUBJECT, what=shown, why="no subject is chosen", cure=cure)]
 
@@ -108,7 +105,8 @@ class Pipeline:
         self._light = LightTransition()
         self._open_matte = open_matte
         self._make_anyone = make_anyone
-        self._identity = LiveIdentity(open_embedder, landmark_scheme(tracker.scheme))
+        self._identity = LiveIdentity(self._opened_embedder, landmark_scheme(tracker.scheme))
+        self._open_embedder = open_embedder
         self._anyone: Subject | None = None
         self._troubles: dict[str, Degradation] = {}
         self._compositor = Compositor(size, self._opened_matte, self.timer, self._troubles)
@@ -188,9 +186,9 @@ class Pipeline:
             self._troubles.pop("identity", None)
             return scene.subject or self._opened_anyone()
         plain = motion.status is FaceStatus.FOUND and motion.pose is not None and motion.pose.turn_deg <= PLAIN_TURN_DEG
+        landmarks = None if motion.status is FaceStatus.LOST else motion.landmarks
         with self.timer.stage("identity"):
-            landmarks = motion.landmarks if plain else None
-            verdict = self._identity.verdict(scene.subject, frame.image, landmarks, frame.time_s)
+            verdict = self._identity.verdict(scene.subject, frame.image, landmarks, plain, frame.time_s)
         if verdict is not Verdict.OTHER:
             self._troubles.pop("identity", None)
             return scene.subject
@@ -207,6 +205,10 @@ class Pipeline:
             self.on_opening()
             self._anyone = self._make_anyone()
         return self._anyone
+
+    def _opened_embedder(self) -> FaceEmbedder:
+        self.on_opening()
+        return self._open_embedder()
 
     def _opened_matte(self) -> Matting:
         self.on_opening()

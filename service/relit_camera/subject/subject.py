@@ -21,7 +21,7 @@ from relit_camera.subject.rungs import Rung
 
 FORMAT_VERSION: Literal[2] = 2
 ANYONE = "anyone"
-"""The method of the subject that is nobody's."""
+"""The name, and the method, of the subject that is nobody's."""
 MIN_SIDE_PX, MAX_SIDE_PX = 8, 8192
 """Least and largest side of a subject's picture, in pixels."""
 HORIZON_STEP_RAD = np.pi / 255

@@ -11,7 +11,7 @@ from relit_camera.base.errors import ConflictError, NotFoundError, SubjectError
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.storage.atomic_files import make_folder, storage_error
 from relit_camera.base.storage.named_files import NamedFiles
-from relit_camera.subject.subject import Subject, SubjectMetadata
+from relit_camera.subject.subject import ANYONE, Subject, SubjectMetadata
 from relit_camera.subject.subject_file import SUFFIX, read_metadata, read_neutral, read_subject
 
 
@@ -26,7 +26,7 @@ class SubjectStore(NamedFiles):
             copied: whether a copy of a file is mapped, not the file (see `read_subject`).
         """
         # Subjects come into the folder by hand (`relit capture --out`), so their names may be any file's.
-        super().__init__(folder, "subject", [SUFFIX], any_name=True)
+        super().__init__(folder, "subject", [SUFFIX], any_name=True, reserved=frozenset({ANYONE}))
         self._copied = copied
 
     def new_path(self, name: str) -> Path:

@@ -35,17 +35,24 @@ class Embedder(FaceEmbedder):
         return None if place is None else np.eye(1, 128, dtype=np.float32)[0] * np.float32(place)
 
 
-def watched(identity: LiveIdentity, subject: Subject, start_s: float, seconds: float, followed: bool = True) -> Verdict:
+def watched(
+    identity: LiveIdentity,
+    subject: Subject,
+    start_s: float,
+    seconds: float,
+    followed: bool = True,
+    plain: bool = True,
+) -> Verdict:
     """The verdict after so long at 30 frames a second."""
     for step in range(int(30 * seconds)):
-        last = identity.verdict(subject, IMAGE, POINTS if followed else None, start_s + step / 30)
+        last = identity.verdict(subject, IMAGE, POINTS if followed else None, plain, start_s + step / 30)
     return last
 
 
 def test_one_s_own_and_another_s_face_are_told_after_some_looks() -> None:
     embedder = Embedder()
     identity = LiveIdentity(lambda: embedder, SCHEME)
-    assert identity.verdict(ME, IMAGE, POINTS, 0.0) is Verdict.UNKNOWN
+    assert identity.verdict(ME, IMAGE, POINTS, True, 0.0) is Verdict.UNKNOWN
     assert watched(identity, ME, 0.0, 2.0) is Verdict.SAME
     assert watched(identity, YOU, 2.0, 0.1) is Verdict.OTHER  # by the looks that are known
     assert embedder.looks < 10
@@ -58,8 +65,17 @@ def test_whoever_comes_after_a_while_is_looked_at_anew() -> None:
     assert watched(identity, ME, 0.0, 2.0) is Verdict.SAME
     assert watched(identity, ME, 2.0, 2.0, followed=False) is Verdict.SAME  # nothing new is known
     embedder.before = PLACES["you"]
-    assert identity.verdict(ME, IMAGE, POINTS, 4.0) is Verdict.UNKNOWN
+    assert identity.verdict(ME, IMAGE, POINTS, True, 4.0) is Verdict.UNKNOWN
     assert watched(identity, ME, 4.0, 2.0) is Verdict.OTHER
+
+
+def test_who_looks_aside_for_long_is_still_the_same() -> None:
+    embedder = Embedder()
+    identity = LiveIdentity(lambda: embedder, SCHEME)
+    assert watched(identity, YOU, 0.0, 2.0) is Verdict.OTHER
+    looks = embedder.looks
+    assert watched(identity, YOU, 2.0, 5.0, plain=False) is Verdict.OTHER
+    assert embedder.looks == looks
 
 
 def test_without_the_network_nothing_is_known_and_it_is_looked_for_once() -> None:

@@ -30,6 +30,7 @@ from relit_camera.live.status.status_board import StatusBoard
 from relit_camera.live.supervision.camera_loop import CameraLoop, Placeholders, publish_if_current
 from relit_camera.live.supervision.fallback_renderer import FallbackPicture, FallbackRenderer
 from relit_camera.live.supervision.pipeline_supervisor import PipelineSupervisor, ShownPicture
+from relit_camera.subject.subject import ANYONE
 from tests.virtual_clock import VirtualClock
 
 SIZE = (8, 6)
@@ -115,7 +116,7 @@ class FakeFallback:
     def release(self, now: float) -> None:
         self.released += 1
 
-    def note_live(self, frame: Frame, motion: FaceMotion | None) -> None:
+    def note_live(self, frame: Frame, motion: FaceMotion | None, scene: Scene) -> None:
         self.live = frame.index
 
 
@@ -199,17 +200,16 @@ def test_without_a_face_it_searches(camera: LoopUnderTest) -> None:
     assert camera.events()[2:] == [("tracking", "lost"), ("state", "searching")]
 
 
-def test_without_a_subject_whoever_comes_is_relit_in_mode_live(camera: LoopUnderTest) -> None:
-    camera.scene = replace(camera.scene, unlit_allowed=False)
+def test_whoever_comes_is_relit_where_that_is_chosen(camera: LoopUnderTest) -> None:
+    camera.scene = replace(camera.scene, subject_name=ANYONE, unlit_allowed=False)
     camera.run(1.0)
     assert camera.newest().image is PICTURE
     assert camera.board.state is CameraState.LIVE
 
 
-def test_without_a_subject_there_is_no_portrait_and_nothing_unlit_where_that_is_forbidden(
-    camera: LoopUnderTest,
-) -> None:
-    camera.scene = replace(camera.scene, look=Look(mode=Mode.PORTRAIT), unlit_allowed=False)
+@pytest.mark.parametrize("mode", list(Mode))
+def test_without_a_subject_nothing_is_shown_where_unlit_is_forbidden(camera: LoopUnderTest, mode: Mode) -> None:
+    camera.scene = replace(camera.scene, look=Look(mode=mode), unlit_allowed=False)
     camera.run(1.0)
     assert camera.publisher.placeholder is NOBODY
     assert camera.publisher.pictures.newer(0, 0) is None

@@ -79,7 +79,7 @@ def test_it_moves_aside_as_the_head_did_when_it_was_last_tracked_and_does_since(
     fallback, scene = renderer(), lit_from(0)
     live = live_frame()
     at_rest = middle(shown(fallback, live, scene))
-    fallback.note_live(live, motion(shift=(4, 0, 0)))
+    fallback.note_live(live, motion(shift=(4, 0, 0)), scene)
     aside = middle(shown(fallback, live, scene))
     assert aside > at_rest + 5
     moved = Frame(np.roll(live.image, 6, axis=1), 1, live.captured_at + 0.03, live.time_s + 0.03)
@@ -144,12 +144,20 @@ def test_a_live_picture_is_held_and_nothing_of_the_source_image_appears(
 
     fallback = renderer(never, instead)
     scene = Scene(Look(mode=Mode.LIVE), subject=person(), unlit_allowed=allowed)
-    fallback.note_live(at(0.0), None)
+    fallback.note_live(at(0.0), None, scene)
     assert fallback.picture(at(2.0), scene) is None
     assert fallback.picture(at(2.0 + HOLD_S - 0.1), scene) is None
     picture = fallback.picture(at(2.0 + HOLD_S), scene)
     assert picture is not None
     assert picture.unlit is filmed
     np.testing.assert_array_equal(picture.image, live_frame().image if filmed else FAILED)
-    fallback.note_live(at(20.0), None)
+    fallback.note_live(at(20.0), None, scene)
     assert fallback.picture(at(21.0), scene) is None, "it begins anew after a picture"
+
+
+def test_nothing_of_another_mode_is_held() -> None:
+    """Who turns to portrait while pictures fail is hidden at once."""
+    live = Scene(Look(mode=Mode.LIVE), subject=person())
+    fallback = renderer(Opener())
+    fallback.note_live(at(0.0), None, live)
+    np.testing.assert_array_equal(shown(fallback, at(0.1), lit_from(0)), FAILED)

@@ -67,7 +67,7 @@ class OutputSettings(SettingsModel):
     `placeholder`, or `filmed`, the webcam's picture as it is, room and all, if `unlit_allowed` is true too."""
     unlit_allowed: bool = False
     """Whether the picture as filmed may be published: without a subject, without a face in mode live, before and after
-    (`split`). Else a placeholder or the subject's relit picture at rest is. The panel can allow it for one run."""
+    (`split`). Else what `live.publishing.what_is_shown` says is. The panel can allow it for one run."""
 
     @field_validator("sink", mode="before")
     @classmethod

@@ -24,6 +24,8 @@ from relit_camera.subject.subject import ANYONE, Subject
 
 SIDE_PX, SIDE_CM = 112, 44.0
 """Of its picture; a person's own has more, but only detail that a stranger does not have anyway."""
+SCHEMES = (SCHEME, "openseeface66")
+"""Schemes of the landmarks that it keeps: those of all trackers."""
 SKIN = (172, 130, 108)
 """sRGB of its picture, in even light."""
 FRAME_LUMINANCE = 0.2
@@ -51,8 +53,9 @@ def anyone() -> Subject:
         ),
         ANYONE,
     ).subject
+    marks = {name: project(landmark_scheme(name).canonical, pose, size).astype(np.float32) for name in SCHEMES}
     of_nobody = {"method": ANYONE, "rung": None, "expected_db": None}
-    return replace(subject, metadata=subject.metadata.model_copy(update=of_nobody))
+    return replace(subject, landmarks=marks, metadata=subject.metadata.model_copy(update=of_nobody))
 
 
 def _matte(landmarks: Points, pose: HeadPose, size: tuple[int, int]) -> Mask:

@@ -60,6 +60,7 @@ def replay(
     from relit_camera.cli.model_offer import offer_models
     from relit_camera.cli.progress import progress_bar
     from relit_camera.live.scene.scene_controller import SceneController
+    from relit_camera.subject.subject import ANYONE
 
     if contact_sheet and contact_sheet.suffix.lower() not in (".png", ".jpg", ".jpeg"):
         raise typer.BadParameter(f"{contact_sheet} is neither .png nor .jpg", param_hint="--contact-sheet")
@@ -75,10 +76,12 @@ def replay(
     scene_controller = SceneController(settings.storage)
     if subject is not None:
         scene_controller.load_configured_subject(subject)
-    elif instant and (captured := _instant_subject(video, settings)):
+    elif instant and (captured := _instant_subject(video, settings, chosen_mode is Mode.PORTRAIT)):
         scene_controller.show_subject("instant", captured)
     elif chosen_mode is Mode.PORTRAIT:
         raise typer.BadParameter("portrait needs --subject, or --instant", param_hint="--mode")
+    else:
+        scene_controller.load_configured_subject(ANYONE)
     lighting = parse_lighting(scene_controller.register_temporary_environment(environment), rotate, exposure_ev)
     scene_controller.set_look(Look(lighting=lighting, background=chosen_background, mode=chosen_mode))
     track = make_tracker(settings)
@@ -140,8 +143,12 @@ def _otherwise_shown(frames: Sequence[ReplayedFrame]) -> str:
     return "".join(f"; {what} in {counts[kind]}" for kind, what in words.items() if counts[kind])
 
 
-def _instant_subject(video: Path, settings: RelitSettings) -> Subject | None:
-    """The subject that the first seconds of the video give, or None; warnings are printed."""
+def _instant_subject(video: Path, settings: RelitSettings, not_without: bool) -> Subject | None:
+    """The subject that the first seconds of the video give; warnings are printed. None where they show no usable face.
+
+    Raises:
+        CaptureError: that is so, and it does not do without.
+    """
     from relit_camera.base.errors import CaptureError
     from relit_camera.capture.instant.frame_reading import read_frames
     from relit_camera.capture.instant.instant_capture import capture_instant
@@ -153,6 +160,8 @@ def _instant_subject(video: Path, settings: RelitSettings) -> Subject | None:
             frames = read_frames(str(video), settings.source, report_stage).frames
             captured = capture_instant(frames, video.name, report_stage)
     except CaptureError as error:
+        if not_without:
+            raise
         typer.echo(f"warning: {error}; whoever is in it is lit as a mean head would be", err=True)
         return None
     for warning in captured.warnings:

@@ -11,6 +11,7 @@ import weakref
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.errors import NotFoundError
 from relit_camera.base.images.image_types import DisplayImage, Points
 from relit_camera.base.models.model_store import model_path
 from relit_camera.base.models.session_with_fallback import SessionOptions, open_session
@@ -60,7 +61,10 @@ class FaceEmbedder:
 
     def _embed_subject(self, subject: Subject) -> Embedding | None:
         for name, landmarks in subject.landmarks.items():
-            scheme = landmark_scheme(name)
+            try:
+                scheme = landmark_scheme(name)
+            except NotFoundError:  # of a tracker that is not here
+                continue
             if len(landmarks) == scheme.count:
                 return self.embed(subject.neutral, landmarks, scheme)
         return None

@@ -28,13 +28,16 @@ class LiveIdentity:
         self._track = PersonTrack()
         self._judge: tuple[Subject, IdentityJudge | None] | None = None
 
-    def verdict(self, subject: Subject, image: DisplayImage, landmarks: Points | None, time_s: float) -> Verdict:
+    def verdict(
+        self, subject: Subject, image: DisplayImage, landmarks: Points | None, plain: bool, time_s: float
+    ) -> Verdict:
         """What is known by now of a live face and a subject.
 
         Args:
             subject: whose face it might be.
             image: the frame, uint8 sRGB.
-            landmarks: of the face in it; None where none is followed well enough to be looked at.
+            landmarks: of the face in it; None where none is followed.
+            plain: whether the face is seen well enough to be looked at.
             time_s: of the frame.
         """
         embedder = self._opened()
@@ -42,7 +45,7 @@ class LiveIdentity:
             return Verdict.UNKNOWN
         if landmarks is not None:
             self._track.found(time_s)
-            if self._track.is_due(time_s):
+            if plain and self._track.is_due(time_s):
                 self._track.add(embedder.embed(image, landmarks, self._scheme), time_s)
         if self._judge is None or self._judge[0] is not subject:
             reference = embedder.reference_embedding(subject)

@@ -23,6 +23,8 @@ from relit_camera.live.scene.scene import Scene
 from relit_camera.live.status.camera_status import Degradation, DegradationCode
 from relit_camera.live.status.stage_timing import StageTimer
 
+MATTE_KEPT_S = 0.1
+"""A matte is not used again for a later frame than this."""
 SURELY_PERSON = 0.8
 """Confidence of the source image above which a cell is the person's, whatever the matte says."""
 
@@ -47,7 +49,7 @@ class Compositor:
         """
         self._background_renderer = BackgroundRenderer(size)
         self._matte: Matting | None = None
-        self._last_matte: Alpha | None = None
+        self._last_matte: tuple[Alpha, float] | None = None
         self._matte_age = 0
         self._troubles = troubles
         self._open_matte = open_matte
@@ -89,8 +91,9 @@ class Compositor:
             return picture
         with self._timer.stage("matte"):
             matte = self._person_matte(frame, required=not kept, every=matte_every if kept else 1)
-        if matte is None:
-            return picture
+        unseen = kept and person is not None and matte is not None and not matte.any()
+        if matte is None or unseen:
+            return picture  # better the room is relit than somebody who is there is not
         if person is not None:
             matte = np.maximum(matte, _sure_alpha(person, frame.size))
         request = _background_request(scene)
@@ -108,8 +111,8 @@ class Compositor:
         Or that of the last frame again, but for one of `every` frames.
         """
         last, self._matte_age = self._last_matte, self._matte_age + 1
-        if last is not None and self._matte_age < every and last.shape == frame.image.shape[:2]:
-            return last
+        if last is not None and self._matte_age < every and 0 < frame.time_s - last[1] < MATTE_KEPT_S:
+            return last[0]
         if self._matte is None and (required or "matte" not in self._troubles):
             try:
                 self._matte = self._open_matte()
@@ -121,14 +124,19 @@ class Compositor:
                 self._troubles["matte"] = Degradation(what, error.what, error.cure, code=code)
             else:
                 self._troubles.pop("matte", None)
-        self._last_matte, self._matte_age = None if self._matte is None else self._matte.matte(frame), 0
-        return self._last_matte
+        if self._matte is None:
+            return None
+        self._last_matte, self._matte_age = (self._matte.matte(frame), frame.time_s), 0
+        return self._last_matte[0]
 
 
 def _sure_alpha(person: NDArray[np.float32], size: tuple[int, int]) -> Alpha:
     """Alpha of `size` (width, height) for what cells surely show of the person."""
     sure = np.clip((person - SURELY_PERSON) / (1 - SURELY_PERSON), 0, 1)
-    return np.asarray(cv2.resize((255 * sure).astype(np.uint8), size, interpolation=cv2.INTER_LINEAR), np.uint8)
+    step = -(-size[0] // person.shape[1])  # the last cells may go beyond the picture
+    whole = (step * person.shape[1], step * person.shape[0])
+    alpha = cv2.resize((255 * sure).astype(np.uint8), whole, interpolation=cv2.INTER_LINEAR)
+    return np.asarray(alpha[: size[1], : size[0]], np.uint8)
 
 
 def composite_source_image(

@@ -65,22 +65,18 @@ class LiveMode:
         live = fit_frame(frame, self._context.size)
         fitted = fit_motion(motion, frame.size, self._context.size)  # what is given on is that of the frame
         plan = self._plan(fitted, live, scene, quality)
-        return partial(self._render, plan, live, motion, scene, quality.matte_every)
+        return partial(self._render, plan, self._seen(plan), live, motion, scene, quality.matte_every)
 
     def _render(
-        self, plan: RatioPlan, live: Frame, motion: FaceMotion, scene: Scene, matte_every: int
+        self, plan: RatioPlan, seen: FacePresence, live: Frame, motion: FaceMotion, scene: Scene, matte_every: int
     ) -> RenderedFrame:
         """The relit live picture, and where `split` says so the live one."""
         context, lighting = self._context, scene.look.lighting
         with context.timer.stage("move"):
             relit = self._relighting.apply(plan, lighting.blend)
         with context.timer.stage("compose"):
-            sure = relit.person if plan.presence >= 1 else None  # a face that is lost is there no more
-            image = context.compositor.composite_live(relit.image, live, scene, sure, matte_every)
-        if plan.presence > 0:
-            seen = FacePresence.FOLLOWED
-        else:
-            seen = FacePresence.NOT_YET if self._last is None else FacePresence.LOST
+            person = None if motion.status is FaceStatus.LOST else relit.person  # who is lost is there no more
+            image = context.compositor.composite_live(relit.image, live, scene, person, matte_every)
         shown = what_is_shown(Situation(scene.look.mode, seen))
         image = split_view(image, live.image, lighting.split)
         return RenderedFrame(image, motion, scene, shown, unlit=scene.look.shows_filmed)
@@ -96,7 +92,8 @@ class LiveMode:
                 room = relighting.room_light.update(frame.image, motion.landmarks, rotation, frame.time_s)
                 if self._skin is not None:
                     self._tint = self._skin.update(frame.image, room.skin, frame.time_s)
-            self._last = room, rotation
+            if room.light_map.any():  # else nothing of the face could be used
+                self._last = room, rotation
         if self._last is None:
             return RatioPlan(frame, self._eased_rest(self._compared.place_tint(scene, frame.time_s), frame.time_s))
         room, rotation = self._last
@@ -119,6 +116,11 @@ class LiveMode:
             eye_distance = context.face.scheme.eye_span(motion.landmarks)
             face = FaceLight(room.gain, pictures, positions, eye_distance)
             return relighting.aligned(RatioPlan(frame, rest, presence, face))
+
+    def _seen(self, plan: RatioPlan) -> FacePresence:
+        if plan.presence > 0:
+            return FacePresence.FOLLOWED
+        return FacePresence.NOT_YET if self._last is None else FacePresence.LOST
 
     def _is_followed(self, motion: FaceMotion) -> bool:
         """Whether the face tells its light: it is seen, and not in profile."""

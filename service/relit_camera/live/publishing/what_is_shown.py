@@ -53,7 +53,7 @@ class Situation:
     Attributes:
         mode: that was chosen.
         face: of the live person.
-        has_subject: whether somebody is chosen; else whoever comes is relit in mode live.
+        has_subject: whether somebody is chosen, or whoever comes.
         rendering: whether the pipeline gives pictures.
         can_rest: whether the source image can be relit now without the pipeline.
         filmed_allowed: the picture as filmed may be published.
@@ -74,10 +74,8 @@ def what_is_shown(now: Situation) -> Shown:
 
     A person is shown as filmed only where that is allowed.
     """
-    if not now.has_subject and now.filmed_allowed:
-        return Shown.FILMED
-    if not now.has_subject and now.mode is Mode.PORTRAIT:
-        return Shown.PLACEHOLDER
+    if not now.has_subject:
+        return Shown.FILMED if now.filmed_allowed else Shown.PLACEHOLDER
     if now.rendering is Rendering.WORKS:
         if now.face is FacePresence.FOLLOWED:
             return Shown.RELIT

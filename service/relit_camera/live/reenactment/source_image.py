@@ -64,7 +64,8 @@ def find_source_face(subject: Subject, tracker: Tracker) -> SourceFace:
     """
     scheme = landmark_scheme(tracker.scheme)
     recorded = isinstance(tracker, RecordedTracker)
-    landmarks = None if recorded else _tracked_landmarks(subject, tracker)
+    # The head that is nobody's is no picture of a face: a tracker would find nothing in it, or something wrong.
+    landmarks = None if recorded or subject.is_anyone else _tracked_landmarks(subject, tracker)
     if landmarks is None:
         landmarks = subject.landmarks.get(scheme.name)
     if landmarks is None and recorded:

@@ -18,6 +18,7 @@ from relit_camera.base.safe_yaml import MAX_YAML_BYTES, parse_yaml, yaml_text
 from relit_camera.base.storage.atomic_files import make_folder, write_atomic
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.scene.scene_controller import ChosenSubject, SceneController
+from relit_camera.subject.subject import ANYONE
 
 log = logging.getLogger(__name__)
 
@@ -227,5 +228,5 @@ class SceneKeeper:
             configured_look=self._configured_look,
             configured_subject=self._configured_subject,
         )
-        stored = scene.subject_name is None or scene.subject_name in self._scene_controller.subjects.names()
+        stored = scene.subject_name in (None, ANYONE, *self._scene_controller.subjects.names())
         return kept.model_dump(mode="json", exclude=None if stored else {"subject"})

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from relit_camera.base.config.look import Look, Mode
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.light.environments.environment_panorama import Environment
-from relit_camera.subject.subject import Subject
+from relit_camera.subject.subject import ANYONE, Subject
 
 
 @dataclass(frozen=True)
@@ -19,11 +19,10 @@ class Scene:
         environment: the environment that lights the face; None for lamps only.
         background_image: the picture of an `image` background, uint8 sRGB RGB (height, width, 3); None for other kinds.
         subject_name: name of the subject, for status and panel.
-        subject: the person shown. Without one whoever comes is relit as anybody would be, in mode live; where the
-            picture as filmed may be published that is shown.
+        subject: the person shown; None shows nobody, or in mode live whoever comes where the name is `ANYONE`.
         frozen: whether the published picture is held.
         unlit_allowed: whether the picture as filmed may be published: where there is no subject, no face, before and
-            after. Else the subject's relit picture at rest is, or a placeholder.
+            after. Else what `what_is_shown` says is.
         revision: number of changes so far.
         mode_revision: the revision with which the look's mode was last changed.
         can_undo, can_redo: whether there is a change to undo, or to do again.
@@ -43,5 +42,5 @@ class Scene:
 
     @property
     def shows_nobody(self) -> bool:
-        """Whether nobody is relit: nobody is chosen, and in portrait there is nobody to show, or all is as filmed."""
-        return self.subject is None and (self.unlit_allowed or self.look.mode is Mode.PORTRAIT)
+        """Whether nobody is relit: a placeholder is shown, or the picture as filmed where that is allowed."""
+        return self.subject is None and not (self.subject_name == ANYONE and self.look.mode is Mode.LIVE)

@@ -27,7 +27,7 @@ from relit_camera.live.scene.loading_changes import Loaded, load_and_change
 from relit_camera.live.scene.look_loader import LookLoader
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.scene.scene_history import SceneHistory, ScenePoint, TakeStep
-from relit_camera.subject.subject import Subject
+from relit_camera.subject.subject import ANYONE, Subject
 from relit_camera.subject.subject_store import SubjectStore
 
 
@@ -186,8 +186,9 @@ class SceneController:
             NotFoundError: neither a stored name nor a file.
             SubjectError: the file is damaged.
         """
-        if name_or_path is None:
-            return ChosenSubject(None)
+        if name_or_path in (None, ANYONE):
+            return ChosenSubject(name_or_path)
+        assert name_or_path is not None
         name, subject = self.subjects.resolve(name_or_path)
         if name_or_path not in self.subjects.names():
             if name in self.subjects.names():
@@ -298,8 +299,9 @@ class SceneController:
             RelitError: it cannot be.
         """
         name = chosen.name
-        if name is None or chosen.subject is not None:
+        if name in (None, ANYONE) or chosen.subject is not None:
             return chosen.subject
+        assert name is not None
         loaded.require_usable(name)
         path = self.subject_path(name)
         if name not in loaded.subjects:

@@ -175,7 +175,7 @@ class CameraLoop:
     def _note_shown(self, shown: ShownPicture) -> None:
         self.pipeline_rate.tick(shown.at)
         motion = shown.rendered.motion
-        self._fallback.note_live(shown.frame, motion)
+        self._fallback.note_live(shown.frame, motion, shown.rendered.scene)
         face = motion.status if motion else FaceStatus.LOST
         self._board.set_face(face)
         # A picture of a frame before the one that failed is no recovery: fallbacks follow.

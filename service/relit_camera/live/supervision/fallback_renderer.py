@@ -97,11 +97,13 @@ class FallbackRenderer:
         self._source: _RelitSource | None = None
         self._opening: tuple[Subject, Future[_RelitSource]] | None = None
         self._failing_since: float | None = None
+        self._last_scene: Scene | None = None
         self._used_at = 0.0
         self._failed_subject: Subject | None = None
 
-    def note_live(self, frame: Frame, motion: FaceMotion | None) -> None:
-        """A live picture of this frame was shown, in which the face moved so: a fallback goes on from there."""
+    def note_live(self, frame: Frame, motion: FaceMotion | None, scene: Scene) -> None:
+        """A picture of this frame was shown for a scene, in which the face moved so: a fallback goes on from there."""
+        self._last_scene = scene
         self._failing_since = None
         self._head.begin_at(frame, motion)
 
@@ -119,14 +121,14 @@ class FallbackRenderer:
 
     def picture(self, frame: Frame, scene: Scene) -> FallbackPicture | None:
         """A picture in place of this live frame; None where the last one is held. Never raises."""
-        now = self._used_at = frame.captured_at
+        now = frame.captured_at
         if self._failing_since is None:
             self._failing_since = now
         rest = self._at_rest(frame, scene) if scene.look.mode is Mode.PORTRAIT else None
         situation = Situation(
             scene.look.mode,
-            has_subject=scene.subject is not None,
-            rendering=Rendering.FAILS if now - self._failing_since < self._hold_s else Rendering.HAS_FAILED,
+            has_subject=not scene.shows_nobody,
+            rendering=Rendering.FAILS if self._may_hold(now, scene) else Rendering.HAS_FAILED,
             can_rest=rest is not None,
             filmed_allowed=scene.unlit_allowed,
             filmed_when_failing=self._fallback is Fallback.FILMED,
@@ -141,11 +143,18 @@ class FallbackRenderer:
         assert rest is not None
         return FallbackPicture(rest)
 
+    def _may_hold(self, now: float, scene: Scene) -> bool:
+        """Whether the last picture may stay: it is no older, and of the mode and the subject that are chosen now."""
+        last, since = self._last_scene, self._failing_since
+        same = last is None or (last.look.mode is scene.look.mode and last.subject is scene.subject)
+        return same and since is not None and now - since < self._hold_s
+
     def _at_rest(self, frame: Frame, scene: Scene) -> DisplayImage | None:
         """The source image of the scene's subject before its background; None while that cannot be made."""
         subject = scene.subject
         if subject is None or subject is self._failed_subject:
             return None
+        self._used_at = frame.captured_at
         try:
             source = self._opened(subject)
             return None if source is None else self._relit(source, scene, frame)
