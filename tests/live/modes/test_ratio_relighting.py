@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from relit_camera.base.images.color import linear_from_uint8
+from relit_camera.base.images.color import LUMINANCE, linear_from_uint8
 from relit_camera.base.images.image_quality import psnr
 from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage, Points
 from relit_camera.base.images.light_multiplication import light_of_root, root_of_light
@@ -23,10 +23,13 @@ from relit_camera.light.light_map_rotation import rotate_light_map
 from relit_camera.live.modes.frame_fitting import fit_motion
 from relit_camera.live.modes.ratio_relighting import (
     BOX_CELLS,
+    CASTS,
+    FACTORS,
     FaceLight,
     RatioPlan,
     RatioRelighting,
     _cells_within,
+    bounded_factor,
     extrapolate_roots,
     fit_similarity,
 )
@@ -251,10 +254,22 @@ def test_cells_tell_where_the_person_surely_is() -> None:
 
 def test_the_mean_factor_is_that_of_the_whole_person() -> None:
     ours = relighting(WINDOW)
-    pictures = ours.raised_lights(still_under(WINDOW) * np.array([0.5, 1.0, 2.0], np.float32), still_under(WINDOW))
-    np.testing.assert_allclose(ours.mean_factor(pictures, np.ones(3, np.float32)), [0.5, 1.0, 2.0], rtol=0.04)
+    pictures = ours.raised_lights(still_under(WINDOW) * np.array([0.8, 1.0, 1.3], np.float32), still_under(WINDOW))
+    np.testing.assert_allclose(ours.mean_factor(pictures, np.ones(3, np.float32)), [0.8, 1.0, 1.3], rtol=0.04)
     doubled = ours.mean_factor(pictures, np.full(3, 2, np.float32))
-    np.testing.assert_allclose(doubled, [0.25, 0.5, 1.0], rtol=0.04)  # the frame is exposed twice as long
+    np.testing.assert_allclose(doubled, [0.4, 0.5, 0.65], rtol=0.04)  # the frame is exposed twice as long
+
+
+@pytest.mark.parametrize("factor", [[40.0, 2.0, 1.0], [0.01, 0.01, 0.01], [0.0, 0.0, 5.0]])
+def test_a_factor_of_somebody_who_was_misread_is_bounded(factor: list[float]) -> None:
+    found = bounded_factor(np.array(factor))
+    level = float(found @ LUMINANCE)
+    assert FACTORS[0] * CASTS[0] - 1e-6 <= found.min() <= found.max() <= FACTORS[1] * CASTS[1] + 1e-6
+    assert found.max() / max(level, 1e-6) < 2.5
+
+
+def test_a_factor_within_the_bounds_stays() -> None:
+    np.testing.assert_allclose(bounded_factor(np.array([0.8, 0.7, 0.5])), [0.8, 0.7, 0.5], rtol=1e-6)
 
 
 def test_what_is_made_for_the_person_s_cells_alone_is_what_all_cells_would_give() -> None:

@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.images.color import LUMINANCE
 from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage, Points
 from relit_camera.base.images.light_multiplication import POWER, light_of_root, multiply_light, root_of_light
 from relit_camera.base.images.temporal_noise import TemporalNoiseFilter
@@ -55,8 +56,9 @@ BOX_CELLS = 8
 EXTRAPOLATION_CELLS, WIDE_REDUCTION = 45, 4
 """The extrapolation beyond the person is computed for so many there, and its wide blurs for fewer by a factor."""
 
-FACTORS = (0.02, 12.0)
-"""Limits of the mean factor of light."""
+FACTORS, CASTS = (0.02, 3.0), (0.6, 1.6)
+"""Limits of the mean factor of light, and of a channel's beside that of luminance: further off, a face was misread that
+hardly tells its light, in a mask before a lamp say, and the whole person would glow."""
 
 
 class RoomLight(Protocol):
@@ -173,7 +175,7 @@ class RatioRelighting:
     def mean_factor(self, pictures: NDArray[np.float32], gain: NDArray[np.float32]) -> NDArray[np.float32]:
         """The factor (3,) by which the light of the whole person is multiplied; arguments as in `FaceLight`."""
         relit, under_room = (np.array(cv2.mean(half, self._inside)[:3]) for half in np.split(pictures, 2))
-        return np.clip(relit / np.maximum(under_room * gain, MIN_CHANNEL_MEAN), *FACTORS).astype(np.float32)
+        return bounded_factor(relit / np.maximum(under_room * gain, MIN_CHANNEL_MEAN))
 
     def positions(self, motion: FaceMotion, pose: HeadPose, size: tuple[int, int]) -> PositionGrid:
         """Where a live frame of `size` (width, height) lies in the source image.
@@ -276,6 +278,12 @@ class RatioRelighting:
         # Lids and lips are the live picture's; the light on them is that of the skin round them.
         flow = face_and_head_flow(self._motion, self._mesh, self._points, target, moved, pose)
         return Warp(source_from_live, flow)
+
+
+def bounded_factor(factor: NDArray[np.floating]) -> NDArray[np.float32]:
+    """A factor of light (3,) within `FACTORS` and `CASTS`."""
+    level = max(float(factor @ LUMINANCE), 1e-6)
+    return np.asarray(np.clip(factor / level, *CASTS) * np.clip(level, *FACTORS), np.float32)
 
 
 def _cell_side(size: tuple[int, int]) -> int:

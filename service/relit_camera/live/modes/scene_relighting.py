@@ -19,7 +19,7 @@ from relit_camera.face.head_pose import project
 from relit_camera.light.exposure import WHITE_BALL_LUMINANCE, facing_light
 from relit_camera.light.light_map import LightMap
 from relit_camera.light.light_map_rotation import rotate_light_map
-from relit_camera.live.modes.ratio_relighting import FACTORS
+from relit_camera.live.modes.ratio_relighting import bounded_factor
 from relit_camera.live.modes.turn_extrapolation import TurnExtrapolation
 from relit_camera.live.reenactment.source_image import SourceFace
 from relit_camera.live.scene.light_transition import LightTransition
@@ -106,8 +106,7 @@ class SceneRelighting:
         """The factor (3,) that a white ball facing the camera has in the scene's light, where 0.8 is 1."""
         with self._timer.stage("light"):
             light = self._light.update(scene, time_s)
-        tint = facing_light(light) / np.float32(WHITE_BALL_LUMINANCE)
-        return np.asarray(np.clip(tint, *FACTORS), np.float32)
+        return bounded_factor(facing_light(light) / np.float32(WHITE_BALL_LUMINANCE))
 
     def compare(
         self,
