@@ -63,11 +63,11 @@ class OutputSettings(SettingsModel):
     placeholder: Path | None = None
     """Picture shown while there is nothing else to show; a built-in one if not given."""
     fallback: Fallback = Fallback.PLACEHOLDER
-    """While pictures cannot be made the source image is shown, relit; and where that cannot be either, this:
-    `placeholder`, or `filmed`, the webcam's picture as it is, room and all, if `unlit_allowed` is true too."""
+    """While pictures cannot be made the last one is held, or in portrait the source image is shown, relit; after that,
+    this: `placeholder`, or `filmed`, the webcam's picture as it is, room and all, if `unlit_allowed` is true too."""
     unlit_allowed: bool = False
-    """Whether the picture as filmed may be published: without a subject, without a face in mode live, before and after
-    (`split`). Else what `live.publishing.what_is_shown` says is. The panel can allow it for one run."""
+    """Whether the picture as filmed may be published: without a subject, while pictures fail, before and after
+    (`split`). The panel can allow it for one run."""
 
     @field_validator("sink", mode="before")
     @classmethod

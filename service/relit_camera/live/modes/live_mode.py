@@ -34,8 +34,8 @@ class LiveMode:
     """See `RenderMode`.
 
     Where the light of the face cannot be told, because it is lost, in profile or not yet seen, the person goes on in
-    the mean factor that they had, and before one is known in the mean tint of the place: they are never shown as
-    filmed.
+    the mean factor that they had, and before one is known in the mean tint of the place, which in a neutral place is
+    hardly any.
     """
 
     def __init__(self, context: ModeContext, relighting: RatioRelighting, compared: SceneRelighting) -> None:
@@ -125,8 +125,8 @@ class LiveMode:
     def _is_followed(self, motion: FaceMotion) -> bool:
         """Whether the face tells its light: it is seen, and not in profile."""
         limit = MOST_TURN_DEG if self._followed else RETURN_TURN_DEG
-        seen = motion.status is not FaceStatus.LOST and motion.pose is not None
-        self._followed = seen and motion.pose is not None and motion.pose.turn_deg <= limit
+        pose = None if motion.status is FaceStatus.LOST else motion.pose
+        self._followed = pose is not None and pose.turn_deg <= limit
         return self._followed
 
     def _eased_rest(self, factor: NDArray[np.float32], time_s: float) -> NDArray[np.float32]:

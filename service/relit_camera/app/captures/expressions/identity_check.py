@@ -16,8 +16,7 @@ class IdentityTunables:
 
     A person differs from their own subject by 0.03 to 0.17 cm of shape and a residual of 0.08 to 0.34, the most in
     coloured light, other people by 0.10 to 0.40 cm and 0.13 to 1.1. Either alone can mislead (a beard, a cap, a grimace
-    of up to 0.5 cm), so the product of both, each divided by its threshold, decides; and it is the least that was seen
-    in some moments that tells people apart.
+    of up to 0.5 cm), so the product of both, each divided by its threshold, decides.
 
     Attributes:
         shape_cm: RMS distance of the landmarks from the subject's, seen from the front.
@@ -28,11 +27,6 @@ class IdentityTunables:
     residual: float = 0.23
 
 
-def unlikeness(shape_cm: float, residual: float, limits: IdentityTunables) -> float:
-    """How unlike the subject's a face is: above 1 it is another's. Arguments as in `what_differs`."""
-    return (shape_cm / limits.shape_cm) * (residual / limits.residual)
-
-
 def what_differs(shape_cm: float, residual: float, limits: IdentityTunables) -> str | None:
     """What tells a face from the subject's, in words; None where it passes for it.
 
@@ -41,10 +35,8 @@ def what_differs(shape_cm: float, residual: float, limits: IdentityTunables) -> 
         residual: how badly any light explains it, relative to its contrast, see `RoomLightEstimate`.
         limits: the thresholds.
     """
-    return None if unlikeness(shape_cm, residual, limits) <= 1 else _differences(shape_cm, residual)
-
-
-def _differences(shape_cm: float, residual: float) -> str:
+    if (shape_cm / limits.shape_cm) * (residual / limits.residual) <= 1:
+        return None
     return f"it has another shape ({10 * shape_cm:.1f} mm) and looks so under no light (deviation {residual:.2f})"
 
 
