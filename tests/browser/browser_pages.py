@@ -35,12 +35,12 @@ UNUSED = (
 BLOCKED = re.compile(r"Content Security Policy|Refused to")
 
 WIDTHS = (390, 768, 1440, 1920)
-THEMES = {
-    "dark": {"color_scheme": "dark"},
-    "light": {"color_scheme": "light"},
-    "forced colours": {"forced_colors": "active", "color_scheme": "dark"},
+THEMES: dict[str, dict[str, Any]] = {
+    "dark": {"color_scheme": "dark", "forced_colors": "none"},
+    "light": {"color_scheme": "light", "forced_colors": "none"},
+    "forced colours": {"color_scheme": "dark", "forced_colors": "active"},
 }
-"""Options of a browser's context by the theme's name."""
+"""Media features by the theme's name, as options of a browser's context and for `Page.emulate_media`."""
 
 OpenPage = Callable[..., Page]
 """Opens a page: address, then options of Playwright's `new_context`."""

@@ -34,24 +34,25 @@ def is_wider_than_window(page: Page) -> bool:
     return bool(page.evaluate("() => document.documentElement.scrollWidth > document.documentElement.clientWidth"))
 
 
-def at_every_width(page: Page, where: str, widths: tuple[int, ...] = WIDTHS) -> list[str]:
-    """Findings at each width, overflow among them."""
+def in_every_theme(page: Page, where: str, widths: tuple[int, ...] = WIDTHS) -> list[str]:
+    """Findings at each width in each theme, overflow among them."""
     found = []
-    for width in widths:
-        page.set_viewport_size({"width": width, "height": 900})
-        found += findings(page, f"{where}, {width} px")
-        if is_wider_than_window(page):
-            found.append(f"{where}, {width} px: wider than the window")
+    for theme, media in THEMES.items():
+        page.emulate_media(**media)
+        for width in widths:
+            page.set_viewport_size({"width": width, "height": 900})
+            found += findings(page, f"{where}, {theme}, {width} px")
+            if is_wider_than_window(page):
+                found.append(f"{where}, {theme}, {width} px: wider than the window")
     return found
 
 
-@pytest.mark.parametrize("theme", THEMES)
-def test_the_panel(fake: FakeServer, open_page: OpenPage, theme: str) -> None:
+def test_the_panel(fake: FakeServer, open_page: OpenPage) -> None:
     fake.patch("lighting", lamps=LAMPS)
     fake.http.put("presets/evening").raise_for_status()
-    panel = open_panel(open_page, fake.url, **THEMES[theme])
+    panel = open_panel(open_page, fake.url)
     expect(panel.lamp(1)).to_be_visible()
-    assert at_every_width(panel.page, "panel") == []
+    assert in_every_theme(panel.page, "panel") == []
 
 
 def ask_to_save(panel: Panel) -> None:
@@ -109,27 +110,22 @@ OPENED: dict[str, Callable[[Panel], None]] = {
 """How dialogs, menus and parts that are not always there are opened."""
 
 
-@pytest.mark.parametrize("theme", THEMES)
-def test_what_opens_over_the_panel(fake: FakeServer, open_page: OpenPage, theme: str) -> None:
+@pytest.mark.parametrize("name", OPENED)
+def test_what_opens_over_the_panel(fake: FakeServer, open_page: OpenPage, name: str) -> None:
     fake.patch("lighting", lamps=LAMPS)
     fake.http.put("presets/evening").raise_for_status()
-    found = []
-    for name, open_part in OPENED.items():
-        panel = open_panel(open_page, fake.url, **THEMES[theme])
-        expect(panel.lamp(1)).to_be_visible()
-        open_part(panel)
-        found += at_every_width(panel.page, name, (390,))  # it is laid out alike in wider windows
-        panel.page.close()
-    assert found == []
+    panel = open_panel(open_page, fake.url)
+    expect(panel.lamp(1)).to_be_visible()
+    OPENED[name](panel)
+    assert in_every_theme(panel.page, name, (390,)) == []  # it is laid out alike in wider windows
 
 
-@pytest.mark.parametrize("theme", THEMES)
 @pytest.mark.parametrize("path", ["desk", "film", "panel/login.html"])
-def test_other_pages(fake: FakeServer, open_page: OpenPage, path: str, theme: str) -> None:
+def test_other_pages(fake: FakeServer, open_page: OpenPage, path: str) -> None:
     """Each step of them."""
-    page = open_page(fake.url + path, **THEMES[theme])
+    page = open_page(fake.url + path)
     expect(page.locator("h1").first).to_be_visible()
-    found = at_every_width(page, path, (390, 1440))
+    found = in_every_theme(page, path, (390, 1440))
     for step in page.locator("[id^=step-]:is(section)").all():
         name = step.get_attribute("id")
         page.evaluate(
@@ -137,5 +133,5 @@ def test_other_pages(fake: FakeServer, open_page: OpenPage, path: str, theme: st
             " each.hidden = each.id !== name; }",
             name,
         )
-        found += at_every_width(page, f"{path} {name}", (390, 1440))
+        found += in_every_theme(page, f"{path} {name}", (390, 1440))
     assert found == []

@@ -128,7 +128,7 @@ def few_directions(codes: Codes) -> Shot:
 
 
 def narrow_sweep(codes: Codes) -> Shot:
-    return Shot(Film(frames=210, azimuth=(-25, 25), elevation=(-9, 9)).codes(), {"ball": NAMED_BALL})
+    return Shot(Film(frames=170, azimuth=(-25, 25), elevation=(-9, 9)).codes(), {"ball": NAMED_BALL})
 
 
 def enhanced(codes: Codes) -> Shot:
