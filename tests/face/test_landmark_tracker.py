@@ -68,7 +68,7 @@ class FakeDetector:
         found = self._truth()
         return found if found is not None and is_same_face(found.box, box) else None
 
-    def detect(self, image: np.ndarray, near: object = None) -> Detection | None:
+    def detect(self, image: np.ndarray, near: object = None, besides: object = ()) -> Detection | None:
         self.calls += 1
         return self._truth()
 
@@ -167,7 +167,7 @@ def test_another_face_is_taken_over_only_when_the_first_stays_away() -> None:
     rig = Rig(check_every=1)
     rig.step()
     other = FACE + np.array([4 * EYE_SPAN, 0], np.float32)
-    rig.detector.detect = lambda image, near=None: Detection(  # type: ignore[method-assign]
+    rig.detector.detect = lambda image, near=None, besides=(): Detection(  # type: ignore[method-assign]
         bounding_box(other), SCHEME.eye_centers(other), 0.9
     )
     rig.detector.detect_nearby = lambda image, box: None  # type: ignore[method-assign]
@@ -214,7 +214,7 @@ def test_eyes_are_not_compared_under_a_large_roll() -> None:
     rig.step()
     detect = rig.detector.detect
     # YuNet's eyes are wrong there by more than the tolerance.
-    rig.detector.detect = lambda image, near=None: Detection(  # type: ignore[method-assign]
+    rig.detector.detect = lambda image, near=None, besides=(): Detection(  # type: ignore[method-assign]
         detect(image, near).box, SCHEME.eye_centers(rolled) + np.float32(0.7 * EYE_SPAN), 0.9
     )
     reads = rig.network.reads

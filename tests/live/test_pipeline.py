@@ -141,7 +141,7 @@ def test_somebody_else_than_the_subject_is_lit_as_anybody_would_be(distance: flo
     tracker, embedder = SteadyTracker(), Embedder(distance)
     made = Pipeline(
         tracker,
-        make_follower(CPU.tracker, tracker),
+        partial(make_follower, CPU.tracker, tracker),
         SIZE,
         mode_factories(CPU),
         partial(open_relighter, "basis"),
@@ -149,14 +149,14 @@ def test_somebody_else_than_the_subject_is_lit_as_anybody_would_be(distance: flo
         anyone,
         lambda: embedder,
     )
-    made._compositor.composite_live = lambda picture, *_: picture  # type: ignore[method-assign]
+    made._compositor.person_alpha = lambda *_: None  # type: ignore[method-assign]
     chosen = scene(mode=Mode.LIVE, lighting=LAMP_LEFT.model_dump())
     rendered = [made.process(frame(index, textured()), chosen) for index in range(60)]
     assert {each.shown for each in rendered} == {Shown.RELIT}
     assert 4 <= embedder.looks <= 9
     assert [trouble.code for trouble in made.troubles] == [DegradationCode.OTHER_PERSON] * other
     as_anybody = pipeline()
-    as_anybody._compositor.composite_live = lambda picture, *_: picture  # type: ignore[method-assign]
+    as_anybody._compositor.person_alpha = lambda *_: None  # type: ignore[method-assign]
     unchosen = replace(chosen, subject=None, subject_name=ANYONE)
     expected = [as_anybody.process(frame(index, textured()), unchosen) for index in range(60)][-1]
     assert (difference(rendered[-1].image, expected.image) < 1) is other
@@ -389,7 +389,9 @@ class OneGrey:
     def __init__(self, context: ModeContext) -> None:
         self.context = context
 
-    def begin(self, frame: Frame, motion: FaceMotion, scene: Scene, quality: RenderQuality) -> RenderTask:
+    def begin(
+        self, frame: Frame, motion: FaceMotion, scene: Scene, quality: RenderQuality, others: object
+    ) -> RenderTask:
         relit = self.context.scene_relighting.relight(scene, motion.rotation, frame.time_s, quality.relight_every)
         width, height = self.context.size
         value = np.uint8(np.clip(255 * relit.mean(), 1, 255))
@@ -399,7 +401,7 @@ class OneGrey:
 def with_third_mode(tracker: Tracker) -> Pipeline:
     """A pipeline whose mode live is another: its logic knows no mode by name."""
     modes = {**mode_factories(CPU), Mode.LIVE: OneGrey}
-    follower = make_follower(CPU.tracker, tracker)
+    follower = partial(make_follower, CPU.tracker, tracker)
     return Pipeline(tracker, follower, SIZE, modes, partial(open_relighter, "basis"), pytest.fail, anyone, no_embedder)
 
 
@@ -439,7 +441,7 @@ class Everywhere:
 def test_it_says_when_models_are_opened() -> None:
     """For a subject, for a mode, and when a live person must first be parted from the room."""
     tracker, said = SteadyTracker(), []
-    follower = make_follower(CPU.tracker, tracker)
+    follower = partial(make_follower, CPU.tracker, tracker)
     made = Pipeline(
         tracker, follower, SIZE, mode_factories(CPU), partial(open_relighter, "basis"), Everywhere, anyone, no_embedder
     )
@@ -478,13 +480,15 @@ def test_each_frame_is_begun_with_the_quality_of_that_moment() -> None:
     asked: list[RenderQuality] = []
 
     class Noting(OneGrey):
-        def begin(self, frame: Frame, motion: FaceMotion, scene: Scene, quality: RenderQuality) -> RenderTask:
+        def begin(
+            self, frame: Frame, motion: FaceMotion, scene: Scene, quality: RenderQuality, others: object
+        ) -> RenderTask:
             asked.append(quality)
-            return super().begin(frame, motion, scene, quality)
+            return super().begin(frame, motion, scene, quality, others)
 
     tracker = CountingTracker()
     modes = {Mode.PORTRAIT: Noting, Mode.LIVE: Noting}
-    follower = make_follower(CPU.tracker, tracker)
+    follower = partial(make_follower, CPU.tracker, tracker)
     made = Pipeline(tracker, follower, SIZE, modes, partial(open_relighter, "basis"), pytest.fail, anyone, no_embedder)
     noise = np.random.default_rng(0).integers(0, 255, grey().shape).astype(np.uint8)  # flow needs something to follow
     made.process(frame(0, noise), scene())
@@ -500,7 +504,7 @@ def test_each_frame_is_begun_with_the_quality_of_that_moment() -> None:
 def test_the_running_camera_measures_every_second_face_in_mode_live(mode: Mode, measured: int) -> None:
     tracker = CountingTracker()
     modes = {Mode.PORTRAIT: OneGrey, Mode.LIVE: OneGrey}
-    follower = make_follower(CPU.tracker, tracker)
+    follower = partial(make_follower, CPU.tracker, tracker)
     made = Pipeline(tracker, follower, SIZE, modes, partial(open_relighter, "basis"), pytest.fail, anyone, no_embedder)
     noise = np.random.default_rng(0).integers(0, 255, grey().shape).astype(np.uint8)
     made.quality = QUALITY_LEVELS[0]

@@ -15,14 +15,15 @@ from relit_camera.face.matting import matting_factory
 from relit_camera.face.motion.face_follower import FaceFollower, FaceFollowerSettings
 from relit_camera.face.motion.one_euro_filter import FACE_SMOOTHING
 from relit_camera.face.tracking.trackers import TRACKERS, TrackerOptions, open_tracker
+from relit_camera.live.modes.face_lighting import LitAs
 from relit_camera.live.modes.live_mode import LiveMode
 from relit_camera.live.modes.mode import ModeContext, ModeFactory, RenderMode
 from relit_camera.live.modes.portrait_mode import PortraitMode
 from relit_camera.live.modes.ratio_relighting import RatioRelighting, as_large_as_needed
-from relit_camera.live.modes.room_light_estimator import RoomLightEstimator
 from relit_camera.live.pipeline import Pipeline
 from relit_camera.live.reenactment.dense_motion import DenseMotion
 from relit_camera.live.reenactment.reenactor import REENACTORS, ReenactorContext, open_reenactor
+from relit_camera.live.reenactment.source_image import SourceFace
 from relit_camera.subject.relighting.relighter import RELIGHTERS, open_relighter
 from relit_camera.subject.subject import Subject
 
@@ -75,7 +76,7 @@ def make_pipeline(settings: RelitSettings, tracker: Tracker, size: tuple[int, in
     session = session_options(settings.inference)
     return Pipeline(
         tracker,
-        make_follower(settings.tracker, tracker),
+        partial(make_follower, settings.tracker, tracker),
         size,
         mode_factories(settings),
         partial(open_relighter, settings.relight.name, session=session),
@@ -111,10 +112,7 @@ def mode_factories(settings: RelitSettings) -> Mapping[Mode, ModeFactory]:
         reenactor = ReenactorContext(context.subject, context.face, context.size, session)
         return PortraitMode(context, open_reenactor(settings.reenact.reenactor, reenactor))
 
-    def live(context: ModeContext) -> RenderMode:
-        room_light = RoomLightEstimator(context.subject, context.face)
-        subject, face = as_large_as_needed(context.subject, context.face)
-        relighting = RatioRelighting(subject, face, room_light, DenseMotion(session))
-        return LiveMode(context, relighting, context.open_scene_relighting(subject, face))
+    def lit_as(subject: Subject, face: SourceFace) -> LitAs:
+        return LitAs(subject, face, RatioRelighting(*as_large_as_needed(subject, face), DenseMotion(session)))
 
-    return {Mode.LIVE: live, Mode.PORTRAIT: portrait}
+    return {Mode.LIVE: partial(LiveMode, prepare=lit_as), Mode.PORTRAIT: portrait}

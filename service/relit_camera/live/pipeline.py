@@ -7,7 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from relit_camera.base.concurrency.resident_memory import large_allocations_apart
-from relit_camera.base.config.look import Mode
+from relit_camera.base.config.look import Mode, NoBackground
 from relit_camera.base.images.image_types import Frame
 from relit_camera.face.face_state import FaceStatus, Tracker
 from relit_camera.face.identity.face_embedder import FaceEmbedder
@@ -16,6 +16,7 @@ from relit_camera.face.identity.live_identity import LiveIdentity
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
 from relit_camera.face.matting import Matting
 from relit_camera.face.motion.face_follower import FaceFollower, FaceMotion
+from relit_camera.face.tracking.further_faces import FurtherFaces
 from relit_camera.face.tracking.interval_tracker import IntervalTracker
 from relit_camera.live.compositing.compositor import Compositor
 from relit_camera.live.modes.frame_fitting import fit_frame
@@ -73,7 +74,7 @@ class Pipeline:
     def __init__(
         self,
         tracker: Tracker,
-        follower: FaceFollower,
+        make_follower: Callable[[], FaceFollower],
         size: tuple[int, int],
         modes: Mapping[Mode, ModeFactory],
         open_relighter: Callable[[Subject], Relighter],
@@ -85,7 +86,7 @@ class Pipeline:
 
         Args:
             tracker: measures the face in each frame.
-            follower: smooths what it measures into motion since the neutral face.
+            make_follower: makes what smooths the states of one face into motion since its neutral face.
             size: (width, height) of the pictures to make.
             modes: how each mode is made for a subject.
             open_relighter: makes the relighter of a subject.
@@ -98,7 +99,8 @@ class Pipeline:
         self.on_opening: Callable[[], None] = lambda: None
         self._tracker = tracker
         self._live_tracker = IntervalTracker(tracker)
-        self._follower = follower
+        self._follower = make_follower()
+        self._further_faces = FurtherFaces(tracker, make_follower)
         self._size = size
         self._modes = modes
         self._open_relighter = open_relighter
@@ -158,24 +160,34 @@ class Pipeline:
         """
         quality = self.quality
         scene = scene_now()
-        motion = None if scene.shows_nobody else self._track(frame, scene, quality)
+        tracked = None if scene.shows_nobody else self._track(frame, scene, quality)
         scene = scene_now()
         if scene.shows_nobody:
             return lambda: self._render_unrelit(frame, scene)
-        if motion is None:  # the subject was chosen while this frame went untracked: no unlit picture under its scene
-            motion = self._track(frame, scene, quality)
-        return self._mode(self._lit_as(frame, motion, scene), scene.look.mode).begin(frame, motion, scene, quality)
+        if tracked is None:  # the subject was chosen while this frame went untracked: no unlit picture under its scene
+            tracked = self._track(frame, scene, quality)
+        motion, others = tracked
+        mode = self._mode(self._lit_as(frame, motion, scene), scene.look.mode)
+        return mode.begin(frame, motion, scene, quality, others)
 
-    def _track(self, frame: Frame, scene: Scene, quality: RenderQuality) -> FaceMotion:
+    def _track(self, frame: Frame, scene: Scene, quality: RenderQuality) -> tuple[FaceMotion, Mapping[int, FaceMotion]]:
+        """The motion of the face that the camera is for, and in mode live that of the others by their numbers."""
         is_live = scene.look.mode is Mode.LIVE
         with self.timer.stage("track"):
             every = quality.live_track_every if is_live else quality.track_every
             self._live_tracker.set_interval(every, follow_lips=not is_live)
-            return self._follower.follow(self._live_tracker.track(frame), frame.size, frame.time_s)
+            state = self._live_tracker.track(frame)
+            motion = self._follower.follow(state, frame.size, frame.time_s)
+        if not is_live:
+            return motion, {}
+        with self.timer.stage("others"):
+            return motion, self._further_faces.follow(frame, state, every)
 
     def _render_unrelit(self, frame: Frame, scene: Scene) -> RenderedFrame:
         live = fit_frame(frame, self._size)
-        image = self._compositor.composite_live(live.image, live, scene)
+        image, look = live.image, scene.look
+        if not isinstance(look.background, NoBackground) or look.lighting.background_gain_ev != 0:
+            image = self._compositor.composite_live(image, self._compositor.person_alpha(live, scene), live, scene)
         shown = what_is_shown(Situation(scene.look.mode, has_subject=False, filmed_allowed=True))
         # The publisher shows it only where that is allowed.
         return RenderedFrame(image, None, scene, shown, unlit=True)
@@ -206,6 +218,10 @@ class Pipeline:
             self._anyone = self._make_anyone()
         return self._anyone
 
+    def _anyone_and_face(self) -> tuple[Subject, SourceFace]:
+        subject = self._opened_anyone()
+        return subject, find_source_face(subject, self._tracker)
+
     def _opened_embedder(self) -> FaceEmbedder:
         self.on_opening()
         return self._open_embedder()
@@ -232,6 +248,7 @@ class Pipeline:
                 face=face,
                 scene_relighting=SceneRelighting(subject, face, relighter, self._light, self.timer),
                 open_scene_relighting=self._open_scene_relighting,
+                anyone=self._anyone_and_face,
                 compositor=self._compositor,
                 size=self._size,
                 timer=self.timer,

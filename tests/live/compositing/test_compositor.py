@@ -89,16 +89,28 @@ def test_a_new_background_is_faded_in() -> None:
     assert (made.composite_source(square(0), scene(blue, transition_s=1.0), 1.1) == [0, 0, 255]).all()
 
 
+def composed(
+    made: Compositor,
+    picture: DisplayImage,
+    frame: Frame,
+    shown: Scene,
+    person: np.ndarray | None = None,
+    matte_every: int = 1,
+) -> DisplayImage:
+    """A live picture whose people are parted from the room."""
+    return made.composite_live(picture, made.person_alpha(frame, shown, person, matte_every), frame, shown)
+
+
 def test_a_kept_room_is_that_of_the_frame_and_the_person_that_of_the_picture() -> None:
     relit, live = relit_picture(), live_frame()
-    picture = compositor().composite_live(relit, live, scene(NoBackground()))
+    picture = composed(compositor(), relit, live, scene(NoBackground()))
     np.testing.assert_array_equal(picture[:, :32], relit[:, :32])
     np.testing.assert_array_equal(picture[:, 32:], live.image[:, 32:])
 
 
 def test_a_blurred_room_is_that_of_the_frame() -> None:
     relit, live = np.full_like(relit_picture(), 250), live_frame()
-    picture = compositor().composite_live(relit, live, scene(BlurBackground()))
+    picture = composed(compositor(), relit, live, scene(BlurBackground()))
     assert np.abs(picture[:, 48:].astype(int) - live.image[:, 48:]).max() <= 1
 
 
@@ -106,7 +118,7 @@ def test_what_surely_is_the_person_is_left_out_by_no_matte() -> None:
     """Cells of eight pixels; the matte has the left half alone."""
     relit, live, sure = relit_picture(), live_frame(), np.zeros((6, 8), np.float32)
     sure[2:4, 5:8] = 1
-    picture = compositor().composite_live(relit, live, scene(NoBackground()), sure)
+    picture = composed(compositor(), relit, live, scene(NoBackground()), sure)
     assert (picture[20:28, 48:60] == relit[0, 0]).all()
     assert (picture[:8, 40:] == live.image[0, 0]).all()
 
@@ -122,15 +134,21 @@ def test_before_a_kept_room_the_matte_may_be_that_of_the_last_frame(background: 
 
     made = compositor(open_matte=Counting)
     for index in range(6):
-        picture = made.composite_live(relit_picture(), live_frame(index / 30), scene(background), None, 2)
+        picture = composed(made, relit_picture(), live_frame(index / 30), scene(background), None, 2)
     assert Counting.asked == looks
     np.testing.assert_array_equal(picture[:, :32], relit_picture()[:, :32])
 
 
-def test_the_picture_as_filmed_in_its_own_room_needs_no_matte() -> None:
-    live, timer = live_frame(), StageTimer()
-    assert compositor(timer, pytest.fail).composite_live(live.image, live, scene(NoBackground())) is live.image
-    assert "matte" not in timer.lap_ms()
+def test_a_matte_that_is_blind_leaves_nobody_unlit() -> None:
+    class Blind(LeftHalf):
+        def matte(self, frame: Frame) -> Alpha:
+            return np.zeros_like(super().matte(frame))
+
+    relit, sure = relit_picture(), np.zeros((6, 8), np.float32)
+    made = compositor(open_matte=Blind)
+    assert composed(made, relit, live_frame(), scene(NoBackground()), sure) is relit
+    empty = composed(made, relit, live_frame(), scene(NoBackground()))  # nobody is followed: the room is as filmed
+    np.testing.assert_array_equal(empty, live_frame().image)
 
 
 def test_a_room_that_cannot_be_parted_is_relit_with_the_person_and_that_is_told() -> None:
@@ -139,10 +157,10 @@ def test_a_room_that_cannot_be_parted_is_relit_with_the_person_and_that_is_told(
 
     troubles: dict[str, Degradation] = {}
     relit, made = relit_picture(), Compositor(SIZE, missing, StageTimer(), troubles)
-    assert made.composite_live(relit, live_frame(), scene(NoBackground())) is relit
+    assert composed(made, relit, live_frame(), scene(NoBackground())) is relit
     assert [each.code for each in troubles.values()] == [DegradationCode.ROOM_NOT_PARTED]
     with pytest.raises(ModelError):
-        made.composite_live(relit, live_frame(), scene(GREEN))
+        composed(made, relit, live_frame(), scene(GREEN))
 
 
 def test_a_live_person_stands_before_the_chosen_background() -> None:
@@ -150,7 +168,7 @@ def test_a_live_person_stands_before_the_chosen_background() -> None:
     relit, timer = relit_picture(), StageTimer()
     made = compositor(timer)
     for time_s in (0.0, 0.1):
-        picture = made.composite_live(relit, live_frame(time_s), scene())
+        picture = composed(made, relit, live_frame(time_s), scene())
     assert LeftHalf.made == 1
     assert timer.lap_ms()["matte"] > 0
     np.testing.assert_array_equal(picture[:, :32], relit[:, :32])
@@ -160,7 +178,7 @@ def test_a_live_person_stands_before_the_chosen_background() -> None:
 def test_background_gain_dims_the_room_and_not_the_person() -> None:
     relit = relit_picture()
     dimmed = scene(NoBackground(), **Lighting(background_gain_ev=-1).model_dump(include={"background_gain_ev"}))
-    picture = compositor().composite_live(relit, live_frame(), dimmed)
+    picture = composed(compositor(), relit, live_frame(), dimmed)
     expected = uint8_from_linear(linear_from_uint8(live_frame().image) / np.float32(2)).astype(int)
     assert np.abs(picture[:, 40:] - expected[:, 40:]).max() <= 1
     np.testing.assert_array_equal(picture[:, :24], relit[:, :24])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import cv2
@@ -16,21 +16,19 @@ from relit_camera.base.images.light_multiplication import light_of_root, root_of
 from relit_camera.base.images.tone_mapping import display_from_linear, linear_from_display
 from relit_camera.base.models.session_with_fallback import SessionOptions
 from relit_camera.base.rotations import Rotation
-from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.light.light_map import LightMap
 from relit_camera.light.light_map_rotation import rotate_light_map
 from relit_camera.live.modes.frame_fitting import fit_motion
+from relit_camera.live.modes.frame_relighting import FacePlan, FramePlan, FrameRelighting, extrapolate_roots
 from relit_camera.live.modes.ratio_relighting import (
     BOX_CELLS,
     CASTS,
     FACTORS,
     FaceLight,
-    RatioPlan,
     RatioRelighting,
     _cells_within,
     bounded_factor,
-    extrapolate_roots,
     fit_similarity,
 )
 from relit_camera.live.modes.room_light_estimator import RoomLightEstimate, RoomLightEstimator
@@ -65,34 +63,52 @@ class KnownRoom:
         )
 
 
-def relighting(light: LightMap | None = None) -> RatioRelighting:
-    """Ratio relighting of the small person; the room's light is known if given, else measured."""
+@dataclass
+class LivePerson:
+    """A person before a camera: what they are relit by, and what tells their room's light."""
+
+    ratio: RatioRelighting
+    room: KnownRoom | RoomLightEstimator
+    frames: FrameRelighting = field(default_factory=FrameRelighting)
+
+
+def person(light: LightMap | None = None) -> LivePerson:
+    """The small person; the room's light is known if given, else measured."""
     subject, face = close_up(), face_of(close_up())
-    room_light = RoomLightEstimator(subject, face) if light is None else KnownRoom(light)
-    return RatioRelighting(subject, face, room_light, DenseMotion(SessionOptions("cpu")))
+    ratio = RatioRelighting(subject, face, DenseMotion(SessionOptions("cpu")))
+    return LivePerson(ratio, RoomLightEstimator(subject, face) if light is None else KnownRoom(light))
+
+
+def face_light(
+    ratio: RatioRelighting, relit: LinearImage, under_room: LinearImage, motion: FaceMotion, frame: Frame
+) -> FaceLight:
+    """What the face in a frame tells, whose exposure is that of the pictures."""
+    assert motion.pose is not None
+    positions = ratio.positions(motion, motion.pose, frame.size)
+    pictures = ratio.raised_lights(relit, under_room)
+    return FaceLight(np.ones(3, np.float32), pictures, positions, SCHEME.eye_span(motion.landmarks))
+
+
+def planned(ratio: RatioRelighting, frame: Frame, light: FaceLight, presence: float = 1.0) -> FramePlan:
+    return FramePlan(frame, REST, FacePlan(ratio, light, presence) if presence > 0 else None)
 
 
 def relit_live(
-    ours: RatioRelighting, relit: LinearImage, motion: FaceMotion, frame: Frame, blend: float = 1.0
+    ours: LivePerson, relit: LinearImage, motion: FaceMotion, frame: Frame, blend: float = 1.0
 ) -> DisplayImage:
     """The live frame in the light of a relit picture."""
-    assert motion.pose is not None
-    room = ours.room_light.update(frame.image, motion.landmarks, motion.rotation, frame.time_s)
-    pictures = ours.raised_lights(relit, relighter().relight(room.in_head_frame(motion.rotation)[None])[0])
-    positions = ours.positions(motion, motion.pose, frame.size)
-    span = landmark_scheme("mesh478").eye_span(motion.landmarks)
-    face = FaceLight(room.gain, pictures, positions, span)
-    return ours.apply(RatioPlan(frame, REST, motion.presence, face), blend).image
+    room = ours.room.update(frame.image, motion.landmarks, motion.rotation, frame.time_s)
+    under_room = relighter().relight(room.in_head_frame(motion.rotation)[None])[0]
+    light = replace(face_light(ours.ratio, relit, under_room, motion, frame), gain=room.gain)
+    return ours.frames.apply(planned(ours.ratio, frame, light, motion.presence), blend).picture()
 
 
 def aligned_and_not(image: DisplayImage) -> list[DisplayImage]:
     """A live frame in the light of the evening, without and with its positions corrected; the room's light is known."""
-    ours, motion, frame = relighting(WINDOW), before_the_camera(), live_frame(image, 0)
-    assert motion.pose is not None
-    pictures = ours.raised_lights(still_under(EVENING), still_under(WINDOW))
-    positions, span = ours.positions(motion, motion.pose, frame.size), SCHEME.eye_span(motion.landmarks)
-    plan = RatioPlan(frame, REST, 1.0, FaceLight(np.ones(3, np.float32), pictures, positions, span))
-    return [ours.apply(plan).image, ours.apply(ours.aligned(plan)).image]
+    ratio, motion, frame = person().ratio, before_the_camera(), live_frame(image, 0)
+    light = face_light(ratio, still_under(EVENING), still_under(WINDOW), motion, frame)
+    lights = (light, ratio.aligned(frame, light, 1.0))
+    return [FrameRelighting().apply(planned(ratio, frame, each)).picture() for each in lights]
 
 
 def test_a_collar_that_sits_elsewhere_is_relit_as_a_collar() -> None:
@@ -133,20 +149,12 @@ def test_every_part_of_the_person_is_near_them() -> None:
 
 
 def test_nothing_is_aligned_by_whom_nobody_is_sure_of() -> None:
-    ours, motion, frame = relighting(WINDOW), before_the_camera(), live_frame(live_picture(EVENING)[:, ::-1].copy(), 0)
-    assert motion.pose is not None
-    pictures = ours.raised_lights(still_under(EVENING), still_under(WINDOW))
-    positions, span = ours.positions(motion, motion.pose, frame.size), SCHEME.eye_span(motion.landmarks)
-    plan = RatioPlan(frame, REST, 0.2, FaceLight(np.ones(3, np.float32), pictures, positions, span))
-    np.testing.assert_array_equal(corrected(ours, plan), positions.positions)
-    assert np.abs(corrected(ours, replace(plan, presence=1.0)) - positions.positions).max() > 0.1
-
-
-def corrected(ours: RatioRelighting, plan: RatioPlan) -> np.ndarray:
-    """The positions of a plan once it is aligned."""
-    face = ours.aligned(plan).face
-    assert face is not None
-    return face.positions.positions
+    ratio, motion = person().ratio, before_the_camera()
+    frame = live_frame(live_picture(EVENING)[:, ::-1].copy(), 0)
+    light = face_light(ratio, still_under(EVENING), still_under(WINDOW), motion, frame)
+    before = light.positions.positions
+    np.testing.assert_array_equal(ratio.aligned(frame, light, 0.2).positions.positions, before)
+    assert np.abs(ratio.aligned(frame, light, 1.0).positions.positions - before).max() > 0.1
 
 
 def inner(picture: np.ndarray) -> np.ndarray:
@@ -157,14 +165,14 @@ def inner(picture: np.ndarray) -> np.ndarray:
 
 def test_the_rooms_own_light_gives_back_the_live_frame() -> None:
     image = live_picture(WINDOW)
-    picture = relit_live(relighting(WINDOW), still_under(WINDOW), before_the_camera(), live_frame(image, 0))
+    picture = relit_live(person(WINDOW), still_under(WINDOW), before_the_camera(), live_frame(image, 0))
     np.testing.assert_allclose(picture.astype(int), display_from_linear(linear_from_uint8(image)), atol=1)
 
 
 def test_another_light_gives_the_person_in_that_light() -> None:
     """Truth: the same person, the same pose, photographed in the other room."""
     image = live_picture(WINDOW)
-    picture = relit_live(relighting(WINDOW), still_under(EVENING), before_the_camera(), live_frame(image, 0))
+    picture = relit_live(person(WINDOW), still_under(EVENING), before_the_camera(), live_frame(image, 0))
     truth = linear_from_uint8(live_picture(EVENING))
     unchanged = psnr(inner(linear_from_uint8(image)), inner(truth))
     assert psnr(inner(linear_from_uint8(picture)), inner(truth)) > max(24, unchanged + 8)
@@ -173,7 +181,7 @@ def test_another_light_gives_the_person_in_that_light() -> None:
 @pytest.mark.parametrize("scale", [1, 2])
 def test_a_still_person_is_shown_without_a_webcams_noise(scale: int) -> None:
     """Truth: the same person, photographed in the other room without noise."""
-    ours, random, relit = relighting(WINDOW), np.random.default_rng(3), still_under(EVENING)
+    ours, random, relit = person(WINDOW), np.random.default_rng(3), still_under(EVENING)
     image, truth = (
         cv2.resize(live_picture(light), None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC)
         for light in (WINDOW, EVENING)
@@ -184,7 +192,7 @@ def test_a_still_person_is_shown_without_a_webcams_noise(scale: int) -> None:
         noise = 4 * random.standard_normal(image.shape)
         live.append(np.clip(np.rint(image + noise), 0, 255).astype(np.uint8))
         shown.append(relit_live(ours, relit, motion, live_frame(live[-1], step / 5)))
-    alone = relit_live(relighting(WINDOW), relit, motion, live_frame(live[-1], 0))
+    alone = relit_live(person(WINDOW), relit, motion, live_frame(live[-1], 0))
 
     def change(pictures: list[DisplayImage]) -> float:
         return float(np.abs(inner(pictures[-1]).astype(float) - inner(pictures[-2])).mean())
@@ -197,7 +205,7 @@ def test_a_still_person_is_shown_without_a_webcams_noise(scale: int) -> None:
 
 
 def test_a_measured_room_does_nearly_as_well() -> None:
-    image, ours = live_picture(WINDOW), relighting()
+    image, ours = live_picture(WINDOW), person()
     for step in range(12):
         picture = relit_live(ours, still_under(EVENING), before_the_camera(), live_frame(image, step / 5))
     assert psnr(inner(linear_from_uint8(picture)), inner(linear_from_uint8(live_picture(EVENING)))) > 20
@@ -209,7 +217,7 @@ def test_blend_goes_in_light_from_the_live_frame_to_the_relit_one(share: float) 
     image[:20, :20] = np.arange(200, 240, 2, dtype=np.uint8)[:, None]
 
     def shown(blend: float) -> np.ndarray:
-        return relit_live(relighting(WINDOW), still_under(EVENING), before_the_camera(), live_frame(image, 0), blend)
+        return relit_live(person(WINDOW), still_under(EVENING), before_the_camera(), live_frame(image, 0), blend)
 
     live, relit = linear_from_display(image), linear_from_display(shown(1.0))
     expected = display_from_linear(np.asarray(live * (1 - share) + relit * share, np.float32)).astype(int)
@@ -223,7 +231,7 @@ def test_presence_eases_to_the_factor_of_a_person_whose_face_is_not_seen() -> No
 
     def shown(presence: float) -> np.ndarray:
         motion = before_the_camera(presence=presence)
-        return relit_live(relighting(WINDOW), still_under(EVENING), motion, live_frame(image, 0)).astype(int)
+        return relit_live(person(WINDOW), still_under(EVENING), motion, live_frame(image, 0)).astype(int)
 
     at_rest = display_from_linear(linear_from_uint8(image) * REST)
     np.testing.assert_allclose(shown(0.0), at_rest, atol=1)
@@ -234,26 +242,24 @@ def test_presence_eases_to_the_factor_of_a_person_whose_face_is_not_seen() -> No
 
 def test_nobody_followed_is_the_factor_everywhere_and_no_source_image() -> None:
     image = live_picture(WINDOW)
-    relit = relighting(WINDOW).apply(RatioPlan(live_frame(image, 0), REST))
-    np.testing.assert_allclose(relit.image.astype(int), display_from_linear(linear_from_uint8(image) * REST), atol=1)
+    relit = FrameRelighting().apply(FramePlan(live_frame(image, 0), REST))
+    expected = display_from_linear(linear_from_uint8(image) * REST)
+    np.testing.assert_allclose(relit.picture().astype(int), expected, atol=1)
     assert relit.person is None
 
 
 def test_cells_tell_where_the_person_surely_is() -> None:
-    ours, motion, frame = relighting(WINDOW), before_the_camera(), live_frame(live_picture(WINDOW), 0)
-    assert motion.pose is not None
-    pictures = ours.raised_lights(still_under(EVENING), still_under(WINDOW))
-    positions = ours.positions(motion, motion.pose, frame.size)
-    face = FaceLight(np.ones(3, np.float32), pictures, positions, SCHEME.eye_span(motion.landmarks))
-    person = ours.apply(RatioPlan(frame, REST, 1.0, face)).person
-    assert person is not None
-    rows, columns = person.shape
-    assert person[rows // 2, columns // 2] > 0.95
-    assert person[-1].max() < 0.2  # of what goes on beyond the source image it tells nothing
+    ratio, motion, frame = person().ratio, before_the_camera(), live_frame(live_picture(WINDOW), 0)
+    light = face_light(ratio, still_under(EVENING), still_under(WINDOW), motion, frame)
+    sure = FrameRelighting().apply(planned(ratio, frame, light)).person
+    assert sure is not None
+    rows, columns = sure.shape
+    assert sure[rows // 2, columns // 2] > 0.95
+    assert sure[-1].max() < 0.2  # of what goes on beyond the source image it tells nothing
 
 
 def test_the_mean_factor_is_that_of_the_whole_person() -> None:
-    ours = relighting(WINDOW)
+    ours = person().ratio
     pictures = ours.raised_lights(still_under(WINDOW) * np.array([0.8, 1.0, 1.3], np.float32), still_under(WINDOW))
     np.testing.assert_allclose(ours.mean_factor(pictures, np.ones(3, np.float32)), [0.8, 1.0, 1.3], rtol=0.04)
     doubled = ours.mean_factor(pictures, np.full(3, 2, np.float32))
@@ -277,29 +283,67 @@ def test_what_is_made_for_the_person_s_cells_alone_is_what_all_cells_would_give(
     matte = np.zeros_like(subject.matte)
     height, width = matte.shape
     cv2.ellipse(matte, (width // 2, height // 2), (width // 8, height // 6), 0, 0, 360, 1.0, -1)
-    ours = RatioRelighting(
-        replace(subject, matte=matte),
-        face_of(subject),
-        KnownRoom(WINDOW),
-        DenseMotion(SessionOptions("cpu")),
-    )
+    ratio = RatioRelighting(replace(subject, matte=matte), face_of(subject), DenseMotion(SessionOptions("cpu")))
+    ours = LivePerson(ratio, KnownRoom(WINDOW))
     frame, motion = live_frame(image, 0), before_the_camera()
     assert motion.pose is not None
-    nodes = ours.positions(motion, motion.pose, frame.size).nodes()
-    left, top, right, bottom = _cells_within(nodes, *ours._near)
+    nodes = ratio.positions(motion, motion.pose, frame.size).nodes()
+    left, top, right, bottom = _cells_within(nodes, *ratio._near)
     assert 0 < left < right < nodes.shape[1]
     assert 0 < top < bottom < nodes.shape[0]
     assert not any(side % BOX_CELLS for side in (left, top, right, bottom)), "or it would flicker as the person moves"
     few = relit_live(ours, still_under(EVENING), motion, frame).astype(int)
-    ours._near = (-1e9, -1e9), (1e9, 1e9)
-    error = np.abs(few - relit_live(ours, still_under(EVENING), motion, frame))
+    ratio._near = (-1e9, -1e9), (1e9, 1e9)
+    error = np.abs(few - relit_live(LivePerson(ratio, ours.room), still_under(EVENING), motion, frame))
     assert error.mean() < 0.1
     assert error.max() <= 5
 
 
+@pytest.mark.parametrize("box", [(37, 20, 91, 83), (0, 0, 5, 5), (100, 90, 120, 120), (0, 0, 0, 0)])
+def test_a_part_is_what_the_whole_picture_shows_there(box: tuple[int, int, int, int]) -> None:
+    ratio, motion, frame = person().ratio, before_the_camera(), live_frame(live_picture(WINDOW), 0)
+    light = face_light(ratio, still_under(EVENING), still_under(WINDOW), motion, frame)
+    relit = FrameRelighting().apply(planned(ratio, frame, light))
+    left, top, right, bottom = box
+    part, whole = relit.picture(box), relit.picture()
+    np.testing.assert_array_equal(part[top:bottom, left:right], whole[top:bottom, left:right])
+    assert (part == frame.image).all(axis=2).mean() > 0.5
+    assert (whole == frame.image).all(axis=2).mean() < 0.1
+
+
+def beside(motion: FaceMotion, left: int, size: tuple[int, int]) -> FaceMotion:
+    """The motion of a head that lies so many pixels further right, in a picture of `size` (width, height)."""
+    pose = motion.pose
+    assert pose is not None
+    way = left + size[0] / 4 - size[0] / 2
+    across = np.array([-way * pose.translation[2] / pose.focal_px, 0, 0])
+    landmarks = motion.landmarks + np.array([left, 0], np.float32)
+    return replace(motion, landmarks=landmarks, pose=replace(pose, translation=pose.translation + across))
+
+
+def test_each_of_two_persons_is_relit_by_their_own_face() -> None:
+    """Two of the same person side by side, one of them lit from elsewhere; truth: each alone."""
+    image, ratio, motion = live_picture(WINDOW), person().ratio, before_the_camera()
+    width = image.shape[1]
+    both = live_frame(np.hstack([image, image]), 0)
+    here, there = (beside(motion, left, both.size) for left in (0, width))
+    lights = (
+        face_light(ratio, still_under(EVENING), still_under(WINDOW), here, both),
+        face_light(ratio, still_under(WINDOW), still_under(WINDOW), there, both),
+    )
+    first, second = (FacePlan(ratio, each, 1.0) for each in lights)
+    shown = FrameRelighting().apply(FramePlan(both, REST, first, (second,))).picture()
+    alone = FrameRelighting().apply(FramePlan(both, REST, first)).picture()
+    middle = np.s_[:, width + width // 3 : width + 2 * width // 3]
+    np.testing.assert_allclose(shown[middle].astype(int), both.image[middle], atol=6)
+    assert np.abs(alone[middle].astype(int) - both.image[middle]).mean() > 6, "the other's light is another"
+    left = np.s_[:, width // 3 : 2 * width // 3]
+    assert np.abs(shown[left].astype(int) - alone[left]).mean() < 0.5
+
+
 def test_odd_sizes_keep_their_size() -> None:
     image = np.ascontiguousarray(live_picture(WINDOW)[:-1, :-3])
-    picture = relit_live(relighting(WINDOW), still_under(WINDOW), before_the_camera(), live_frame(image, 0))
+    picture = relit_live(person(WINDOW), still_under(WINDOW), before_the_camera(), live_frame(image, 0))
     assert picture.shape == image.shape
 
 
@@ -357,7 +401,7 @@ def test_the_rim_is_trusted_less_than_the_middle() -> None:
 def test_overexposed_skin_is_shown_as_the_source_image_has_it() -> None:
     """Nothing of it is in the live picture: multiplied, it would glow red, the first color to be cut off."""
     image, scene = np.full_like(live_picture(WINDOW), 255), still_under(WINDOW) * np.float32(0.5)
-    picture = relit_live(relighting(WINDOW), scene, before_the_camera(), live_frame(image, 0))
+    picture = relit_live(person(WINDOW), scene, before_the_camera(), live_frame(image, 0))
     truth = linear_from_uint8(live_picture(WINDOW)) / 2
     error = np.abs(inner(linear_from_uint8(picture)) - inner(truth)).max(axis=2)
     assert np.mean(error < 0.05) > 0.75  # eyes and lips are the live picture's all the same

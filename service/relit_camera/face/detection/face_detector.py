@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -42,9 +43,15 @@ class Detection:
 class FaceDetector(ABC):
     """Finds faces in a picture. Not thread-safe."""
 
-    def detect(self, image: DisplayImage, near: Box | None = None) -> Detection | None:
-        """Find the face that overlaps `near` most, or else the largest; None where there is no face."""
-        faces = self._faces(image)
+    def detect(self, image: DisplayImage, near: Box | None = None, besides: Sequence[Box] = ()) -> Detection | None:
+        """Find the face that overlaps `near` most, or else the largest; None where there is none besides some others.
+
+        Args:
+            image: the picture.
+            near: where one is expected.
+            besides: faces that are not wanted.
+        """
+        faces = [face for face in self._faces(image) if not any(is_same_face(face.box, each) for each in besides)]
         return max(faces, key=lambda face: _detection_priority(face.box, near)) if faces else None
 
     def detect_all(self, image: DisplayImage) -> list[Detection]:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.images.image_types import DisplayImage, Frame, Points
-from relit_camera.face.detection.face_detector import Detection, FaceDetector, is_same_face
+from relit_camera.face.detection.face_detector import Box, Detection, FaceDetector, is_same_face
 from relit_camera.face.face_state import LOST, FaceState, FaceStatus
 from relit_camera.face.head_pose import fit_pose
 from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme
@@ -125,7 +125,11 @@ class LandmarkNetwork(Protocol):
 
 
 class LandmarkTracker:
-    """A `face.face_state.Tracker` made of a detector and a landmark network."""
+    """A `face.face_state.Tracker` made of a detector and a landmark network.
+
+    Attributes:
+        besides: boxes of faces that others follow: it leaves them alone.
+    """
 
     def __init__(
         self,
@@ -141,7 +145,16 @@ class LandmarkTracker:
         self._detector = detector
         self._focal_px = focal_px
         self._check_every = check_every
+        self.besides: tuple[Box, ...] = ()
         self.reset()
+
+    def beside(self) -> LandmarkTracker:
+        """A tracker of another face by the same networks, for the same thread."""
+        return LandmarkTracker(self.name, self._network, self._detector, self._focal_px, self._check_every)
+
+    def faces(self, image: DisplayImage) -> list[Detection]:
+        """Every face in a picture."""
+        return self._detector.detect_all(image)
 
     def reset(self) -> None:
         """Forget the face: the next frame is searched by the detector."""
@@ -151,7 +164,13 @@ class LandmarkTracker:
 
     def track(self, frame: Frame) -> FaceState:
         """Measure the face in `frame`."""
-        status, reading = self._locate(frame.image)
+        return self._state(frame, *self._locate(frame.image))
+
+    def take(self, frame: Frame, detection: Detection) -> FaceState:
+        """Measure the face that is detected in `frame`, to follow it from now on."""
+        return self._state(frame, *self._start(frame.image, detection))
+
+    def _state(self, frame: Frame, status: FaceStatus, reading: LandmarkPrediction | None) -> FaceState:
         if reading is None:
             self.reset()
             return LOST
@@ -175,7 +194,7 @@ class LandmarkTracker:
     def _locate(self, image: DisplayImage) -> tuple[FaceStatus, LandmarkPrediction | None]:
         reading = self._track_from_previous(image, self._last.points) if self._last else None
         if self._last is None or reading is None:
-            detection = self._detector.detect(image)
+            detection = self._detector.detect(image, besides=self.besides)
             return self._start(image, detection) if detection else (FaceStatus.LOST, None)
         self._frames_since_check += 1
         cut = not self._last.matches(image)
@@ -190,7 +209,9 @@ class LandmarkTracker:
             # The crop no longer fits: read again around the new points, and let the detector check them.
             self._frames_since_check = self._check_every
             reading = self._network.read(image, self._network.crop_from_points(reading.points))
-        return reading if reading.confidence >= self._network.threshold else None
+        box = bounding_box(reading.points)
+        slid = any(is_same_face(box, each) for each in self.besides)
+        return None if slid or reading.confidence < self._network.threshold else reading
 
     def _start(self, image: DisplayImage, detection: Detection) -> tuple[FaceStatus, LandmarkPrediction | None]:
         """Read a crop around a detection, then one around the points found: the detection's box is coarse."""
@@ -213,7 +234,7 @@ class LandmarkTracker:
         nearby = self._detector.detect_nearby(image, box)
         if nearby and is_same_face(nearby.box, box) and self._agrees(reading, nearby):
             return self._judge(reading, agrees=True)
-        detection = self._detector.detect(image, near=box)
+        detection = self._detector.detect(image, near=box, besides=self.besides)
         if detection is None or not is_same_face(detection.box, box):
             # The detector misses profiles, so this alone is no proof that the face is gone.
             status, kept = self._judge(reading, agrees=False)

@@ -62,21 +62,14 @@ class Compositor:
         """
         return composite_source_image(self._background_renderer, layer, scene, now)
 
-    def composite_live(
-        self,
-        picture: DisplayImage,
-        frame: Frame,
-        scene: Scene,
-        person: NDArray[np.float32] | None = None,
-        matte_every: int = 1,
-    ) -> DisplayImage:
-        """The person of the relit live picture before the scene's background; both are of the output's size.
+    def person_alpha(
+        self, frame: Frame, scene: Scene, person: NDArray[np.float32] | None = None, matte_every: int = 1
+    ) -> Alpha | None:
+        """Alpha of the people in a live frame of the output's size; None where they are not parted from the room.
 
-        A room that is kept or blurred is that of the frame, as filmed. Where the person cannot be parted from it, since
-        the matting model is missing, a kept room is relit as the picture is.
+        That is before a kept room, if the matting model is missing or sees nobody where somebody is.
 
         Args:
-            picture: the relit live picture.
             frame: the live frame.
             scene: what to show.
             person: (rows, columns) float32, how surely cells of the frame show the person, 0..1: the matte leaves out
@@ -87,22 +80,34 @@ class Compositor:
             ModelError: another background needs the matting model, and it is missing.
         """
         kept = isinstance(scene.look.background, NoBackground)
-        if kept and picture is frame.image and scene.look.lighting.background_gain_ev == 0:
-            return picture
         with self._timer.stage("matte"):
             matte = self._person_matte(frame, required=not kept, every=matte_every if kept else 1)
-        unseen = kept and person is not None and matte is not None and not matte.any()
-        if matte is None or unseen:
-            return picture  # better the room is relit than somebody who is there is not
-        if person is not None:
-            matte = np.maximum(matte, _sure_alpha(person, frame.size))
+        if matte is None or person is None:
+            return matte
+        if kept and not matte.any():
+            return None  # better the room is relit than somebody who is there is not
+        return np.maximum(matte, _sure_alpha(person, frame.size))
+
+    def composite_live(self, picture: DisplayImage, alpha: Alpha | None, frame: Frame, scene: Scene) -> DisplayImage:
+        """The people of a live picture before the scene's background; both are of the output's size.
+
+        A room that is kept or blurred is that of the frame, as filmed.
+
+        Args:
+            picture: in which the people are lit as they shall be.
+            alpha: of them, see `person_alpha`; where it is None the picture stays as it is.
+            frame: the live frame.
+            scene: what to show.
+        """
+        if alpha is None:
+            return picture
         request = _background_request(scene)
-        background = self._background_renderer.live_background(request, MattedFrame(frame.image, matte), frame.time_s)
-        if kept:
-            return over(picture, matte, background)
+        background = self._background_renderer.live_background(request, MattedFrame(frame.image, alpha), frame.time_s)
+        if isinstance(scene.look.background, NoBackground):
+            return over(picture, alpha, background)
         # A blurred room is this frame's own.
         return replace_room(
-            MattedFrame(picture, matte), background, in_place=isinstance(scene.look.background, BlurBackground)
+            MattedFrame(picture, alpha), background, in_place=isinstance(scene.look.background, BlurBackground)
         )
 
     def _person_matte(self, frame: Frame, required: bool, every: int) -> Alpha | None:

@@ -2,30 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from functools import partial
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.base.images.image_types import DisplayImage, Frame
-from relit_camera.base.rotations import Rotation
+from relit_camera.base.images.image_types import Alpha, DisplayImage, Frame
 from relit_camera.face.face_state import FaceStatus
 from relit_camera.face.motion.face_follower import FaceMotion
-from relit_camera.face.motion.motion_blending import EasedPresence
+from relit_camera.live.modes.face_lighting import FaceLighting, LitAs
 from relit_camera.live.modes.frame_fitting import fit_frame, fit_motion
+from relit_camera.live.modes.frame_relighting import FramePlan, FrameRelighting
 from relit_camera.live.modes.mode import ModeContext, RenderedFrame, RenderTask
-from relit_camera.live.modes.ratio_relighting import FaceLight, RatioPlan, RatioRelighting
-from relit_camera.live.modes.room_light_estimator import RoomLightEstimate
-from relit_camera.live.modes.scene_relighting import SceneRelighting
-from relit_camera.live.modes.skin_tint import SkinTint
 from relit_camera.live.publishing.what_is_shown import FacePresence, Situation, what_is_shown
+from relit_camera.live.reenactment.source_image import SourceFace
+from relit_camera.live.reenactment.warp import Box
 from relit_camera.live.render_quality import RenderQuality
 from relit_camera.live.scene.scene import Scene
+from relit_camera.subject.subject import Subject
 
-MOST_TURN_DEG, RETURN_TURN_DEG = 60.0, 54.0
-"""Angle between nose and camera from which landmarks are a guess, and below which they are believed again."""
-EASE_S = 0.5
-"""Seconds over which the light of a face that comes or goes is eased to that of a person whose face is not seen."""
 REST_S = 0.3
 """Time constant with which the factor of a person whose face is not seen follows what is known."""
 
@@ -35,99 +32,87 @@ class LiveMode:
 
     Where the light of the face cannot be told, because it is lost, in profile or not yet seen, the person goes on in
     the mean factor that they had, and before one is known in the mean tint of the place, which in a neutral place is
-    hardly any.
+    hardly any. Further persons are lit as anyone is, each in the light on their own face.
     """
 
-    def __init__(self, context: ModeContext, relighting: RatioRelighting, compared: SceneRelighting) -> None:
+    def __init__(self, context: ModeContext, prepare: Callable[[Subject, SourceFace], LitAs]) -> None:
         """Set up.
 
         Args:
             context: what the mode works with.
-            relighting: of the live picture.
-            compared: relights the source image that `relighting` was made for.
+            prepare: makes what lights a live face as a subject's.
         """
         self._context = context
-        self._relighting = relighting
-        self._compared = compared
-        self._presence = EasedPresence(EASE_S)
-        self._followed = False
-        self._last: tuple[RoomLightEstimate, Rotation] | None = None
-        self._skin = SkinTint(context.subject, context.face) if context.subject.is_anyone else None
-        self._tint = np.ones(3, np.float32)
+        self._prepare = prepare
+        first = prepare(context.subject, context.face)
+        self._compared = context.open_scene_relighting(first.relighting.subject, first.relighting.face)
+        self._first = FaceLighting(first, self._compared, context.timer)
+        self._as_anyone: LitAs | None = None
+        self._others: dict[int, FaceLighting] = {}
+        self._frames = FrameRelighting()
+        self._told = False
         self._rest: NDArray[np.float32] | None = None
         self._rest_s = 0.0
 
-    def begin(self, frame: Frame, motion: FaceMotion, scene: Scene, quality: RenderQuality) -> RenderTask:
+    def begin(
+        self,
+        frame: Frame,
+        motion: FaceMotion,
+        scene: Scene,
+        quality: RenderQuality,
+        others: Mapping[int, FaceMotion],
+    ) -> RenderTask:
         """See `RenderMode.begin`: relights the source image in both lights, and finds where it lies on the live face.
 
         The task multiplies and composes.
         """
-        live = fit_frame(frame, self._context.size)
-        fitted = fit_motion(motion, frame.size, self._context.size)  # what is given on is that of the frame
-        plan = self._plan(fitted, live, scene, quality)
-        return partial(self._render, plan, self._seen(plan), live, motion, scene, quality.matte_every)
+        context = self._context
+        live = fit_frame(frame, context.size)
+        fitted = fit_motion(motion, frame.size, context.size)  # what is given on is that of the frame
+        lit = self._first.update(fitted, live, scene, quality)
+        self._told = self._told or lit.mean is not None
+        rest = self._compared.place_tint(scene, frame.time_s) if lit.mean is None else lit.mean
+        further = self._further({n: fit_motion(each, frame.size, context.size) for n, each in others.items()})
+        plans = (lighting.update(each, live, scene, quality).plan for lighting, each in further)
+        plan = FramePlan(live, self._eased_rest(rest, frame.time_s), lit.plan, tuple(each for each in plans if each))
+        return partial(self._render, plan, self._seen(plan), motion, scene, quality.matte_every)
 
     def _render(
-        self, plan: RatioPlan, seen: FacePresence, live: Frame, motion: FaceMotion, scene: Scene, matte_every: int
+        self, plan: FramePlan, seen: FacePresence, motion: FaceMotion, scene: Scene, matte_every: int
     ) -> RenderedFrame:
         """The relit live picture, and where `split` says so the live one."""
-        context, lighting = self._context, scene.look.lighting
+        context, lighting, live = self._context, scene.look.lighting, plan.frame
         with context.timer.stage("move"):
-            relit = self._relighting.apply(plan, lighting.blend)
+            relit = self._frames.apply(plan, lighting.blend)
         with context.timer.stage("compose"):
             person = None if motion.status is FaceStatus.LOST else relit.person  # who is lost is there no more
-            image = context.compositor.composite_live(relit.image, live, scene, person, matte_every)
+            alpha = context.compositor.person_alpha(live, scene, person, matte_every)
+        with context.timer.stage("move"):
+            picture = relit.picture(None if alpha is None else bounding_box(alpha))
+        with context.timer.stage("compose"):
+            image = context.compositor.composite_live(picture, alpha, live, scene)
         shown = what_is_shown(Situation(scene.look.mode, seen))
         image = split_view(image, live.image, lighting.split)
         return RenderedFrame(image, motion, scene, shown, unlit=scene.look.shows_filmed)
 
-    def _plan(self, motion: FaceMotion, frame: Frame, scene: Scene, quality: RenderQuality) -> RatioPlan:
-        """What must be known to relight the frame."""
-        context, relighting = self._context, self._relighting
-        followed = self._is_followed(motion)
-        presence = self._presence.update(followed, frame.time_s)
-        if followed and motion.pose is not None:
-            rotation = context.face.turn_to(motion.pose)
-            with context.timer.stage("room"):
-                room = relighting.room_light.update(frame.image, motion.landmarks, rotation, frame.time_s)
-                if self._skin is not None:
-                    self._tint = self._skin.update(frame.image, room.skin, frame.time_s)
-            if room.light_map.any():  # else nothing of the face could be used
-                self._last = room, rotation
-        if self._last is None:
-            return RatioPlan(frame, self._eased_rest(self._compared.place_tint(scene, frame.time_s), frame.time_s))
-        room, rotation = self._last
-        pictures = self._compared.compare(
-            scene,
-            rotation,
-            frame.time_s,
-            room.light_map,
-            room.in_head_frame,
-            relighting.raised_lights,
-            quality.relight_every,
-        )
-        if self._skin is not None:
-            pictures = relighting.tinted(pictures, self._tint)
-        rest = self._eased_rest(relighting.mean_factor(pictures, room.gain), frame.time_s)
-        if presence <= 0 or motion.pose is None:
-            return RatioPlan(frame, rest)
-        with context.timer.stage("follow"):
-            positions = relighting.positions(motion, motion.pose, frame.size)
-            eye_distance = context.face.scheme.eye_span(motion.landmarks)
-            face = FaceLight(room.gain, pictures, positions, eye_distance)
-            return relighting.aligned(RatioPlan(frame, rest, presence, face))
+    def _further(self, motions: Mapping[int, FaceMotion]) -> list[tuple[FaceLighting, FaceMotion]]:
+        """What is known of each further face, and its motion; those that are not followed any more are forgotten."""
+        context = self._context
+        self._others = {number: each for number, each in self._others.items() if number in motions}
+        for number in motions:
+            if number not in self._others:
+                if self._as_anyone is None:
+                    self._as_anyone = self._prepare(*context.anyone())
+                relighting = self._as_anyone.relighting
+                compared = context.open_scene_relighting(relighting.subject, relighting.face)
+                first_frame = self._rest is None
+                self._others[number] = FaceLighting(self._as_anyone, compared, context.timer, at_once=first_frame)
+        return [(self._others[number], motion) for number, motion in motions.items()]
 
-    def _seen(self, plan: RatioPlan) -> FacePresence:
-        if plan.presence > 0:
+    def _seen(self, plan: FramePlan) -> FacePresence:
+        if plan.first is not None:
             return FacePresence.FOLLOWED
-        return FacePresence.NOT_YET if self._last is None else FacePresence.LOST
-
-    def _is_followed(self, motion: FaceMotion) -> bool:
-        """Whether the face tells its light: it is seen, and not in profile."""
-        limit = MOST_TURN_DEG if self._followed else RETURN_TURN_DEG
-        pose = None if motion.status is FaceStatus.LOST else motion.pose
-        self._followed = pose is not None and pose.turn_deg <= limit
-        return self._followed
+        return FacePresence.LOST if self._told else FacePresence.NOT_YET
 
     def _eased_rest(self, factor: NDArray[np.float32], time_s: float) -> NDArray[np.float32]:
         """The factor, eased toward it from that of the last frame."""
@@ -136,6 +121,12 @@ class LiveMode:
             self._rest = factor
         self._rest = self._rest + (factor - self._rest) * np.float32(1 - np.exp(-passed / REST_S))
         return self._rest
+
+
+def bounding_box(alpha: Alpha) -> Box:
+    """Left, top, right and bottom of what is not clear."""
+    left, top, width, height = cv2.boundingRect(alpha)
+    return left, top, left + width, top + height
 
 
 def split_view(relit: DisplayImage, live: DisplayImage, share: float) -> DisplayImage:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -51,6 +51,7 @@ class ModeContext:
         face: the face in the subject's source image, in the tracker's landmark scheme.
         scene_relighting: relights that subject as the scene says.
         open_scene_relighting: makes another one, for a subject and the face in its source image.
+        anyone: makes the subject that stands for whoever else is seen, and finds its face.
         compositor: puts the person before the background.
         size: (width, height) of the pictures to make.
         timer: counts the stages.
@@ -60,6 +61,7 @@ class ModeContext:
     face: SourceFace
     scene_relighting: SceneRelighting
     open_scene_relighting: Callable[[Subject, SourceFace], SceneRelighting]
+    anyone: Callable[[], tuple[Subject, SourceFace]]
     compositor: Compositor
     size: tuple[int, int]
     timer: StageTimer
@@ -68,7 +70,14 @@ class ModeContext:
 class RenderMode(Protocol):
     """Makes pictures of one subject in one mode. Keeps state between frames; `begin` is called by one thread."""
 
-    def begin(self, frame: Frame, motion: FaceMotion, scene: Scene, quality: RenderQuality) -> RenderTask:
+    def begin(
+        self,
+        frame: Frame,
+        motion: FaceMotion,
+        scene: Scene,
+        quality: RenderQuality,
+        others: Mapping[int, FaceMotion],
+    ) -> RenderTask:
         """Do the first half of a frame's work, and return the second.
 
         A mode divides its work so that both halves take about as long: two frames are then at work at once.
@@ -78,6 +87,7 @@ class RenderMode(Protocol):
             motion: of the face in that frame.
             scene: what to show; its subject is that of the mode's context.
             quality: what the picture may cost.
+            others: motion of further faces in mode live, each under a number of its own.
 
         Raises:
             ModelError: a model that the scene needs is missing; so does the render task.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from relit_camera.base.images.color import linear_from_uint8
@@ -22,7 +24,14 @@ class PortraitMode:
         self._context = context
         self._reenactor = reenactor
 
-    def begin(self, frame: Frame, motion: FaceMotion, scene: Scene, quality: RenderQuality) -> RenderTask:
+    def begin(
+        self,
+        frame: Frame,
+        motion: FaceMotion,
+        scene: Scene,
+        quality: RenderQuality,
+        others: Mapping[int, FaceMotion],
+    ) -> RenderTask:
         """See `RenderMode.begin`: relights the source image and plans its warp; the task warps and composes."""
         context, timer = self._context, self._context.timer
         relit = context.scene_relighting.relight(scene, motion.rotation, frame.time_s, quality.relight_every)

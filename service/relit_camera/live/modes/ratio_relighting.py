@@ -1,36 +1,32 @@
 """Ratio relighting: the live frame times relit(scene) / relit(room) of the subject, warped onto the live face.
 
-The person's own mouth, eyes and texture stay in the picture; only the light is exchanged.
+The person's own mouth, eyes and texture stay in the picture; only the light is exchanged. Here is what one face tells;
+`frame_relighting` relights whole frames by it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.images.color import LUMINANCE
-from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage, Points
-from relit_camera.base.images.light_multiplication import POWER, light_of_root, multiply_light, root_of_light
-from relit_camera.base.images.temporal_noise import TemporalNoiseFilter
-from relit_camera.base.rotations import Rotation
+from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage
+from relit_camera.base.images.light_multiplication import root_of_light
 from relit_camera.face.head_pose import HeadPose
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.modes.live_alignment import ComparedCells, LiveAlignment
 from relit_camera.live.modes.live_detail import (
+    Cells,
     SourceCells,
     blend_cells,
     live_cells,
-    noise_fraction,
     overexposed,
     shape_cells,
     smoothed,
 )
-from relit_camera.live.modes.room_light_estimator import RoomLightEstimate
 from relit_camera.live.modes.source_masks import inside_face, limits, near_person, ratio_confidence, still_skin
 from relit_camera.live.reenactment.control_points import control_points, head_and_shoulder_anchors
 from relit_camera.live.reenactment.dense_motion import DenseMotion
@@ -53,20 +49,9 @@ SMALL_FRAME_PX = 300
 """Shorter side of frames below which each pixel is such a cell."""
 BOX_CELLS = 8
 """The box of what is relit of the frame begins and ends at multiples of so many cells."""
-EXTRAPOLATION_CELLS, WIDE_REDUCTION = 45, 4
-"""The extrapolation beyond the person is computed for so many there, and its wide blurs for fewer by a factor."""
-
 FACTORS, CASTS = (0.02, 3.0), (0.6, 1.6)
 """Limits of the mean factor of light, and of a channel's beside that of luminance: further off, a face was misread that
 hardly tells its light, in a mask before a lamp say, and the whole person would glow."""
-
-
-class RoomLight(Protocol):
-    """What estimates the room's light; see `RoomLightEstimator`."""
-
-    def update(self, image: DisplayImage, landmarks: Points, rotation: Rotation, time_s: float) -> RoomLightEstimate:
-        """See `RoomLightEstimator.update`."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -87,58 +72,47 @@ class FaceLight:
 
 
 @dataclass(frozen=True)
-class RatioPlan:
-    """What is known of one live frame before it is relit.
+class FaceCells:
+    """What a face tells of some cells of a live frame.
 
     Attributes:
-        frame: the live frame.
-        rest: (3,) float32 factor of light for a person whose face does not tell their light.
-        presence: how far the face tells it, 0..1.
-        face: what it tells; None where nobody is followed.
+        box: left, top, right and bottom of the cells.
+        ratio: (rows, columns, 4) float32, the roots of the ratio times the confidence, and the confidence.
+        trust: (rows, columns) how far the live picture's detail is shown, 0..1.
+        sure: (rows, columns) how surely cells show what the source image has there of the person, 0..1.
+        smooth: (rows, columns, 3) roots of the live picture's light with hardly any noise.
+        source: of the source image there.
+        unit: the eye distance in cells.
     """
 
-    frame: Frame
-    rest: NDArray[np.float32]
-    presence: float = 0.0
-    face: FaceLight | None = None
-
-
-@dataclass(frozen=True)
-class RelitFrame:
-    """A live frame in another light.
-
-    Attributes:
-        image: uint8 sRGB.
-        person: (rows, columns) float32, how surely cells of the frame show what the source image has there of the
-            person, 0..1; None where nobody is followed.
-    """
-
-    image: DisplayImage
-    person: NDArray[np.float32] | None
+    box: Box
+    ratio: Cells
+    trust: Cells
+    sure: Cells
+    smooth: Cells
+    source: SourceCells
+    unit: float
 
 
 class RatioRelighting:
-    """Exchanges the light on the live face of one subject.
+    """What the live face of one subject tells of its light.
 
-    `positions`, `raised_lights` and `apply` share nothing that changes: each may run in a thread of its own. `aligned`,
-    `room_light` and `apply` each see the frames one after another, from one thread at a time.
+    Of these methods only `aligned` changes anything: it sees the frames one after another, from one thread at a time.
 
     Attributes:
-        room_light: estimates the room's light from the live face.
+        subject: the person.
+        face: the face in the source image.
     """
 
-    def __init__(self, subject: Subject, face: SourceFace, room_light: RoomLight, motion: DenseMotion) -> None:
+    def __init__(self, subject: Subject, face: SourceFace, motion: DenseMotion) -> None:
         """Prepare for one subject. Of one that is nobody's (`Subject.is_anyone`) only the shape counts.
 
         Args:
             subject: the person.
             face: the face in the source image.
-            room_light: estimates the room's light from the live face.
             motion: makes the flow between source image and live face.
         """
-        self.room_light = room_light
-        self._shape_alone = subject.is_anyone
-        self._face = face
+        self.subject, self.face = subject, face
         self._motion = motion
         self._points = control_points(face, head_and_shoulder_anchors(face.pose, face.size))
         self._mesh = triangulate_face(face)
@@ -149,7 +123,6 @@ class RatioRelighting:
         self._person, self._near = limits(confidence), limits(near)
         self._parts = cv2.merge([confidence, still_skin(face), inside_face(face), near])
         self._alignment = LiveAlignment(face)
-        self._noise = TemporalNoiseFilter()
 
     def raised_lights(self, relit: LinearImage, under_room: LinearImage) -> NDArray[np.float32]:
         """The source image under the scene's light and, below it, under the room's: (2 · height, width, 3) float32.
@@ -185,91 +158,62 @@ class RatioRelighting:
             pose: of the head in the frame.
             size: of the frame.
         """
-        return self._warp(motion, pose, size).grid((0, 0, *size), _cell_side(size))
+        return self._warp(motion, pose, size).grid((0, 0, *size), cell_side(size))
 
-    def aligned(self, plan: RatioPlan) -> RatioPlan:
-        """The same plan, its positions corrected by what the frame shows; see `live_alignment`."""
-        if plan.face is None or self._shape_alone:
-            return plan
-        face, positions = plan.face, plan.face.positions
-        if plan.presence > SURELY_THERE and self._alignment.is_due(plan.frame.time_s):
+    def aligned(self, frame: Frame, face: FaceLight, presence: float) -> FaceLight:
+        """The same light, its positions corrected by what the frame shows; see `live_alignment`.
+
+        Args:
+            frame: the live frame.
+            face: the light on the face in it.
+            presence: how far the face tells it, 0..1.
+        """
+        if self.subject.is_anyone:
+            return face
+        positions = face.positions
+        if presence > SURELY_THERE and self._alignment.is_due(frame.time_s):
             nodes = positions.nodes() - np.float32(0.5)
             left, top, right, bottom = box = _cells_within(nodes, *self._person)
             looks = nodes[top:bottom, left:right]
             confidence = cv2.remap(self._confidence, looks, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-            live, brightest = live_cells(plan.frame.image, positions.step, box)
+            live, brightest = live_cells(frame.image, positions.step, box)
             confidence[overexposed(brightest)] = 0
             unit = face.eye_distance / positions.step
             cells = ComparedCells(live, _under_room(face, looks), confidence, looks, unit)
-            self._alignment.update(cells, plan.frame.time_s)
-        return replace(plan, face=replace(face, positions=self._alignment.corrected(positions)))
+            self._alignment.update(cells, frame.time_s)
+        return replace(face, positions=self._alignment.corrected(positions))
 
-    def apply(self, plan: RatioPlan, blend: float = 1.0) -> RelitFrame:
-        """The planned frame in the scene's light.
+    def box(self, face: FaceLight) -> Box:
+        """Left, top, right and bottom of the cells of a frame of which the face tells anything."""
+        return _cells_within(face.positions.nodes() - np.float32(0.5), *self._near)
 
-        `blend` is how far, in light: 0 gives the frame itself. Its brightest codes are taken for no more light than
-        sRGB says the further it is relit: more is a guess, which the ratio would show as red blotches where skin is red
-        first. Noise of the frame is removed over time in any case, where a face is followed.
-        """
-        image, step = plan.frame.image, _cell_side(plan.frame.size)
-        rows, columns = (-(-side // step) for side in image.shape[:2])
-        factor = np.empty((rows, columns, 3), np.float32)
-        factor[:] = root_of_light(plan.rest[None])[0]
-        added, person = np.zeros_like(factor), None
-        if plan.face is not None and plan.presence > 0:
-            image, told, more, person = self._face_cells(plan.frame, plan.face, whole=blend < 1)
-            factor = cv2.addWeighted(told, plan.presence, factor, 1 - plan.presence, 0)
-            added = more * np.float32(plan.presence)
-        if blend < 1:
-            live, _ = live_cells(image, step, (0, 0, columns, rows))
-            factor, added = blend_toward_live(np.asarray(factor, np.float32), added, live, blend)
-        return RelitFrame(multiply_light(image, factor, step, as_shown=1 - blend, added=added), person)
-
-    def _face_cells(
-        self, frame: Frame, face: FaceLight, whole: bool
-    ) -> tuple[DisplayImage, NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
-        """The frame with less noise; roots of the factor and what is added, (rows, columns, 3); the person, see above.
-
-        What is near the person is computed, or with `whole` all cells.
-        """
+    def cells(self, image: DisplayImage, face: FaceLight, box: Box) -> FaceCells:
+        """What the face tells of a box of cells of a frame."""
         step = face.positions.step
-        # cv2 counts pixel centers as integers: x_ours = x_cv + ½.
-        nodes = face.positions.nodes() - np.float32(0.5)
-        box = (0, 0, nodes.shape[1], nodes.shape[0]) if whole else _cells_within(nodes, *self._near)
         left, top, right, bottom = box
-        inside = np.s_[top:bottom, left:right]
-        image = self._noise.filtered(frame.image, _pixels_of(box, step, frame.size))
+        # cv2 counts pixel centers as integers: x_ours = x_cv + ½.
+        looks = face.positions.nodes()[top:bottom, left:right] - np.float32(0.5)
         relit, parts = (
-            cv2.remap(each, nodes[inside], None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+            cv2.remap(each, looks, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
             for each in (np.split(face.pictures, 2)[0], self._parts)
         )
         # Roots, because the step between two of them is about as visible anywhere.
-        relit, under_room = root_of_light(relit), _under_room(face, nodes[inside])
+        relit, under_room = root_of_light(relit), _under_room(face, looks)
         live, brightest = live_cells(image, step, box)
         confidence, skin, on_face, near = cv2.split(parts)
         source = SourceCells(relit, under_room, confidence, skin, on_face, near)
         unit = face.eye_distance / step
         smooth = smoothed(live, unit)
-        cells = shape_cells(source) if self._shape_alone else blend_cells(live, smooth, brightest, source, unit)
-        beside = (top, nodes.shape[0] - bottom, left, nodes.shape[1] - right)
-        factor = extrapolate_roots(cv2.copyMakeBorder(cells.ratio, *beside, cv2.BORDER_CONSTANT))
-        trust = cv2.cvtColor(cells.trust, cv2.COLOR_GRAY2RGB)
-        added = cv2.multiply(relit, 1 - trust)
-        factor[inside] *= trust
-        noise = noise_fraction(image, step, box, factor[inside], source, unit)
-        calm = cv2.multiply(factor[inside], cv2.cvtColor(noise, cv2.COLOR_GRAY2RGB))
-        factor[inside] -= calm
-        added += cv2.multiply(calm, smooth)
-        sure = confidence * on_face if self._shape_alone else cv2.extractChannel(cells.ratio, 3)
-        added, person = (cv2.copyMakeBorder(each, *beside, cv2.BORDER_CONSTANT) for each in (added, sure))
-        return image, factor, np.asarray(added, np.float32), np.asarray(person, np.float32)
+        told = shape_cells(source) if self.subject.is_anyone else blend_cells(live, smooth, brightest, source, unit)
+        sure = cv2.multiply(confidence, on_face) if self.subject.is_anyone else cv2.extractChannel(told.ratio, 3)
+        return FaceCells(box, told.ratio, told.trust, np.asarray(sure, np.float32), smooth, source, unit)
 
     def _warp(self, motion: FaceMotion, pose: HeadPose, size: tuple[int, int]) -> Warp:
         """The source image as it lies on the live face of a frame of `size`.
 
         One similarity for the head, a dense flow for the rest.
         """
-        face, chosen = self._face, self._points.chosen
+        face, chosen = self.face, self._points.chosen
         landmarks = motion.landmarks.astype(np.float64)
         live = np.vstack([landmarks[chosen], head_and_shoulder_anchors(pose, size)])
         source_from_live = fit_similarity(landmarks[list(face.scheme.rigid)], face.landmarks[list(face.scheme.rigid)])
@@ -286,7 +230,7 @@ def bounded_factor(factor: NDArray[np.floating]) -> NDArray[np.float32]:
     return np.asarray(np.clip(factor / level, *CASTS) * np.clip(level, *FACTORS), np.float32)
 
 
-def _cell_side(size: tuple[int, int]) -> int:
+def cell_side(size: tuple[int, int]) -> int:
     """The side in pixels of a cell of frames of `size` (width, height)."""
     return 1 if min(size) < SMALL_FRAME_PX else round(min(size) / RATIO_CELLS)
 
@@ -316,12 +260,6 @@ def _cells_within(nodes: NDArray[np.float32], low: tuple[float, ...], high: tupl
     return left, top, min(right, columns), min(bottom, rows)
 
 
-def _pixels_of(cells: Box, step: int, size: tuple[int, int]) -> Box:
-    """The box of a frame's pixels, of `size` (width, height), that cells of `step` pixels show."""
-    left, top, right, bottom = (step * side for side in cells)
-    return left, top, min(right, size[0]), min(bottom, size[1])
-
-
 def as_large_as_needed(subject: Subject, face: SourceFace) -> tuple[Subject, SourceFace]:
     """The subject and its face at half their size where the cells of the ratio still are no smaller than its pixels."""
     if min(subject.size) < 2 * RATIO_CELLS:
@@ -337,58 +275,3 @@ def fit_similarity(points: NDArray[np.float64], onto: NDArray[np.floating]) -> N
     factor = np.vdot(p, q) / max(np.vdot(p, p).real, 1e-12)
     turn = np.array([[factor.real, -factor.imag], [factor.imag, factor.real]])
     return np.column_stack([turn, goal - turn @ center])
-
-
-def blend_toward_live(
-    factor: NDArray[np.float32], added: NDArray[np.float32], live: NDArray[np.float32], share: float
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """What a root x is multiplied by, and what is added to it, where a `share` in light of x · factor + added is shown.
-
-    The rest is x itself. The mixture in light is not linear in x: it is so near `live`, the cells' own root, and
-    everywhere where nothing is added. All are (rows, columns, 3).
-    """
-    live = np.maximum(live, np.float32(1e-3))
-    relit = live * factor + added
-    mixed = np.maximum(((1 - share) * live**POWER + share * relit**POWER) ** (1 / POWER), 1e-3)
-    toward_live, toward_relit = (1 - share) * (live / mixed) ** (POWER - 1), share * (relit / mixed) ** (POWER - 1)
-    return np.asarray(toward_live + toward_relit * factor, np.float32), np.asarray(toward_relit * added, np.float32)
-
-
-def extrapolate_roots(warped: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Extrapolate a ratio that is known only on the person to the whole frame: its roots (height, width, 3) float32.
-
-    Beyond the person it goes on smoothly: wide blurs of what is known, divided by the blurred weight, as light.
-
-    Args:
-        warped: (height, width, 4): roots of the ratio times weight, and the weight.
-    """
-    height, width = warped.shape[:2]
-    small = _shrunk(warped, max(min(height, width) / EXTRAPOLATION_CELLS, 1))
-    roots, weight = small[..., :3], small[..., 3:]
-    small[..., :3] = light_of_root(roots / (weight + np.float32(1e-9))) * weight
-    # Narrow blurs win where they have weight: detail near the person, the mean far away. Wide ones need fewer pixels.
-    wide: NDArray = _sum_of_blurs(_shrunk(small, WIDE_REDUCTION), {2.0: 1 / 8**3, 5.0: 1 / 20**3})
-    spread = cv2.add(
-        _sum_of_blurs(small, {1.0: 1.0, 3.0: 1 / 3**3}),
-        cv2.resize(wide, small.shape[1::-1], interpolation=cv2.INTER_LINEAR),
-    )
-    beyond = root_of_light((spread[..., :3] + np.float32(1e-9)) / (spread[..., 3:] + np.float32(1e-9)))
-    beyond = cv2.resize(beyond, (width, height), interpolation=cv2.INTER_LINEAR)
-    cover = cv2.cvtColor(cv2.extractChannel(warped, 3), cv2.COLOR_GRAY2RGB)
-    known = cv2.cvtColor(warped, cv2.COLOR_RGBA2RGB)
-    cv2.subtract(beyond, cv2.multiply(cover, beyond, dst=cover), dst=beyond)
-    return np.asarray(cv2.add(known, beyond, dst=known), np.float32)
-
-
-def _shrunk(picture: NDArray[np.float32], factor: float) -> NDArray[np.float32]:
-    size = [max(int(side / factor), 1) for side in picture.shape[1::-1]]
-    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.float32)
-
-
-def _sum_of_blurs(picture: NDArray[np.float32], shares: Mapping[float, float]) -> NDArray[np.float32]:
-    """A picture blurred by each of some sigmas, summed by their shares."""
-    total = np.zeros_like(picture)
-    for sigma, share in shares.items():
-        blurred = cv2.GaussianBlur(picture, (0, 0), sigma, borderType=cv2.BORDER_REPLICATE)
-        total = cv2.scaleAdd(blurred, share, total, dst=total)
-    return np.asarray(total, np.float32)

@@ -16,7 +16,8 @@ from relit_camera.face.face_state import Tracker
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.light.light_map import LightMap
 from relit_camera.light.light_map_rotation import rotate_light_map
-from relit_camera.live.modes.ratio_relighting import FaceLight, RatioPlan, RatioRelighting, as_large_as_needed
+from relit_camera.live.modes.frame_relighting import FacePlan, FramePlan, FrameRelighting
+from relit_camera.live.modes.ratio_relighting import FaceLight, RatioRelighting, as_large_as_needed
 from relit_camera.live.modes.room_light_estimator import RoomLightEstimator
 from relit_camera.live.reenactment.dense_motion import DenseMotion
 from relit_camera.live.reenactment.source_image import find_source_face
@@ -71,7 +72,7 @@ class LiveRatio:
         estimator = RoomLightEstimator(subject, face)
         compared, compared_face = as_large_as_needed(subject, face)
         self._relighter = BasisRelighter(compared)
-        self._relighting = RatioRelighting(compared, compared_face, estimator, DenseMotion(SessionOptions("cpu")))
+        self._relighting = RatioRelighting(compared, compared_face, DenseMotion(SessionOptions("cpu")))
         self._gain = np.float32(subject.metadata.display_gain)
         for each in followed:
             assert each.motion.pose is not None
@@ -90,5 +91,7 @@ class LiveRatio:
         pictures = self._relighting.raised_lights(*self._relighter.relight(maps))
         face = FaceLight(self._room.gain, pictures, self._positions, self._eye_distance)
         rest = self._relighting.mean_factor(pictures, self._room.gain)
-        plan = RatioPlan(self._last.frame, rest, float(self._last.motion.presence), face)
-        return self._relighting.apply(self._relighting.aligned(plan)).image
+        frame, presence = self._last.frame, float(self._last.motion.presence)
+        aligned = self._relighting.aligned(frame, face, presence)
+        plan = FramePlan(frame, rest, FacePlan(self._relighting, aligned, presence))
+        return FrameRelighting().apply(plan).picture()
