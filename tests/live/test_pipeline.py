@@ -181,7 +181,7 @@ def test_nobody_is_a_trouble(mode: Mode, allowed: bool, shown: str) -> None:
 def test_live_of_a_frame_of_another_size_is_that_of_the_fitted_frame() -> None:
     """The face is tracked in the frame as it comes, the light is exchanged in the frame as it goes out."""
     size, shown = (160, 90), scene(mode=Mode.LIVE, lighting={"exposure_ev": -2})
-    textured = cv2.resize(np.random.default_rng(0).integers(60, 200, (9, 16, 3), dtype=np.uint8), (320, 240))
+    textured = cv2.resize(np.random.default_rng(0).integers(60, 200, (9, 16, 3), dtype=np.uint8), (320, 180))
     live = frame(0, textured)
     scaled, cut = pipeline(SyntheticTracker(), size), pipeline(SyntheticTracker(), size)
     one = scaled.process(live, shown).image

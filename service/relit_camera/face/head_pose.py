@@ -25,17 +25,19 @@ class HeadPose:
 
     Axes of both frames: X right in the picture, Y up, Z toward the camera; the camera is at the origin, so a visible
     head has translation z < 0. Projection: x_px = cx + focal_px · X / −Z, y_px = cy − focal_px · Y / −Z about the
-    picture's centre (cx, cy) = (width / 2, height / 2).
+    picture's centre (cx, cy) = (width / 2, height / 2), and off it by `axis_px` in one that was cut.
 
     Attributes:
         rotation: camera_from_head; identity is a face looking along +Z into the camera.
         translation: (3,) float64 centimetres, of the canonical face's origin.
         focal_px: focal length used for the fit, in pixels.
+        axis_px: x and y from the picture's centre to where the camera's axis meets the picture.
     """
 
     rotation: Rotation
     translation: NDArray[np.float64]
     focal_px: float
+    axis_px: tuple[float, float] = (0.0, 0.0)
 
     def depth_of(self, point: NDArray[np.float64]) -> float:
         """Distance in centimetres, along the camera's axis, from the camera to a head-space point (3,)."""
@@ -105,7 +107,7 @@ def project(points: NDArray[np.float64], pose: HeadPose, size: tuple[int, int]) 
     """Pixels (count, 2) float32 of head-space points (count, 3) in centimetres under `pose`."""
     camera_points = points @ pose.rotation.as_matrix().T + pose.translation
     across = camera_points[:, :2] * (np.array([-pose.focal_px, pose.focal_px]) / camera_points[:, 2:])
-    return (across + np.array(size) / 2).astype(np.float32)
+    return (across + _axis(pose, size)).astype(np.float32)
 
 
 def unproject(landmarks: Points, pose: HeadPose, scheme: LandmarkScheme, size: tuple[int, int]) -> NDArray[np.float64]:
@@ -117,8 +119,13 @@ def unproject(landmarks: Points, pose: HeadPose, scheme: LandmarkScheme, size: t
     camera_from_head = pose.rotation.as_matrix()
     depth = -(scheme.canonical @ camera_from_head[2] + pose.translation[2])
     camera_points = np.empty((len(landmarks), 3))
-    camera_points[:, :2] = (landmarks - np.array(size) / 2) * np.array([1 / pose.focal_px, -1 / pose.focal_px])
+    camera_points[:, :2] = (landmarks - _axis(pose, size)) * np.array([1 / pose.focal_px, -1 / pose.focal_px])
     camera_points[:, 2] = -1
     camera_points *= depth[:, None]
     camera_points -= pose.translation
     return np.asarray(camera_points @ camera_from_head)
+
+
+def _axis(pose: HeadPose, size: tuple[int, int]) -> NDArray[np.float64]:
+    """Where the camera's axis meets a picture of `size` (width, height), (2,) in pixels."""
+    return np.array(size) / 2 + pose.axis_px

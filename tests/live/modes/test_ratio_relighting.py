@@ -315,10 +315,9 @@ def beside(motion: FaceMotion, left: int, size: tuple[int, int]) -> FaceMotion:
     """The motion of a head that lies so many pixels further right, in a picture of `size` (width, height)."""
     pose = motion.pose
     assert pose is not None
-    way = left + size[0] / 4 - size[0] / 2
-    across = np.array([-way * pose.translation[2] / pose.focal_px, 0, 0])
+    axis_px = (left + size[0] / 4 - size[0] / 2, 0.0)
     landmarks = motion.landmarks + np.array([left, 0], np.float32)
-    return replace(motion, landmarks=landmarks, pose=replace(pose, translation=pose.translation + across))
+    return replace(motion, landmarks=landmarks, pose=replace(pose, axis_px=axis_px))
 
 
 def test_each_of_two_persons_is_relit_by_their_own_face() -> None:

@@ -13,19 +13,41 @@ from relit_camera.base.images.image_types import DisplayImage
 Scalar = TypeVar("Scalar", bound=np.generic)
 
 
-def crop_to_fill(image: DisplayImage, size: tuple[int, int]) -> DisplayImage:
-    """Scale the image to cover `size` (width, height), and crop it to that about its middle."""
-    return resize_to_fill(image, size, cv2.INTER_CUBIC)
+Box = tuple[int, int, int, int]
+"""Left, top, right and bottom, in pixels."""
+MIDDLE = (0.5, 0.5)
 
 
-def resize_to_fill(picture: NDArray[np.uint8], size: tuple[int, int], enlarging: int) -> NDArray[np.uint8]:
+def box_to_fill(picture: tuple[int, int], size: tuple[int, int], middle: tuple[float, float] = MIDDLE) -> Box:
+    """The largest box of a picture's size (width, height) that has the shape of another one.
+
+    `middle` is where it lies, as shares of the picture's width and height, as far as the picture allows.
+    """
+    scale = max(size[0] / picture[0], size[1] / picture[1])
+    columns, rows = (min(side, round(to / scale)) for side, to in zip(picture, size, strict=True))
+    left, top = (
+        min(max(int(share * side - cut / 2), 0), side - cut)
+        for share, side, cut in zip(middle, picture, (columns, rows), strict=True)
+    )
+    return left, top, left + columns, top + rows
+
+
+def crop_to_fill(image: DisplayImage, size: tuple[int, int], middle: tuple[float, float] = MIDDLE) -> DisplayImage:
+    """Scale the image to cover `size` (width, height), and crop it to that; see `box_to_fill`."""
+    return resize_to_fill(image, size, cv2.INTER_CUBIC, middle)
+
+
+def resize_to_fill(
+    picture: NDArray[np.uint8],
+    size: tuple[int, int],
+    enlarging: int,
+    middle: tuple[float, float] = MIDDLE,
+) -> NDArray[np.uint8]:
     """As `crop_to_fill`, for any uint8 picture (height, width, ...); OpenCV interpolates by `enlarging` to enlarge."""
-    height, width = picture.shape[:2]
-    scale = max(size[0] / width, size[1] / height)
-    columns, rows = min(width, round(size[0] / scale)), min(height, round(size[1] / scale))
-    left, top = (width - columns) // 2, (height - rows) // 2
-    cut = np.ascontiguousarray(picture[top : top + rows, left : left + columns])
-    filled: NDArray[np.uint8] = cv2.resize(cut, size, interpolation=cv2.INTER_AREA if scale < 1 else enlarging)
+    left, top, right, bottom = box_to_fill((picture.shape[1], picture.shape[0]), size, middle)
+    cut = np.ascontiguousarray(picture[top:bottom, left:right])
+    shrinks = size[0] < right - left or size[1] < bottom - top
+    filled: NDArray[np.uint8] = cv2.resize(cut, size, interpolation=cv2.INTER_AREA if shrinks else enlarging)
     return filled
 
 

@@ -13,7 +13,7 @@ from relit_camera.base.images.image_types import Alpha, DisplayImage, Frame
 from relit_camera.face.face_state import FaceStatus
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.modes.face_lighting import FaceLighting, LitAs
-from relit_camera.live.modes.frame_fitting import fit_frame, fit_motion
+from relit_camera.live.modes.frame_fitting import FaceCut, fit_frame, fit_motion
 from relit_camera.live.modes.frame_relighting import FramePlan, FrameRelighting
 from relit_camera.live.modes.mode import ModeContext, RenderedFrame, RenderTask
 from relit_camera.live.publishing.what_is_shown import FacePresence, Situation, what_is_shown
@@ -50,6 +50,7 @@ class LiveMode:
         self._as_anyone: LitAs | None = None
         self._others: dict[int, FaceLighting] = {}
         self._frames = FrameRelighting()
+        self._cut = FaceCut(context.size)
         self._told = False
         self._rest: NDArray[np.float32] | None = None
         self._rest_s = 0.0
@@ -67,12 +68,15 @@ class LiveMode:
         The task multiplies and composes.
         """
         context = self._context
-        live = fit_frame(frame, context.size)
-        fitted = fit_motion(motion, frame.size, context.size)  # what is given on is that of the frame
+        middle = self._cut.middle(motion, frame)
+        live = fit_frame(frame, context.size, middle)
+        fitted = fit_motion(motion, frame.size, context.size, middle)  # what is given on is that of the frame
         lit = self._first.update(fitted, live, scene, quality)
         self._told = self._told or lit.mean is not None
         rest = self._compared.place_tint(scene, frame.time_s) if lit.mean is None else lit.mean
-        further = self._further({n: fit_motion(each, frame.size, context.size) for n, each in others.items()})
+        further = self._further(
+            {number: fit_motion(each, frame.size, context.size, middle) for number, each in others.items()}
+        )
         plans = (lighting.update(each, live, scene, quality).plan for lighting, each in further)
         plan = FramePlan(live, self._eased_rest(rest, frame.time_s), lit.plan, tuple(each for each in plans if each))
         return partial(self._render, plan, self._seen(plan), motion, scene, quality.matte_every)
