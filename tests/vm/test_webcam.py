@@ -26,7 +26,7 @@ BARS = [
 ]
 """vivid's "100% Colorbar", from the left."""
 RECOVERY_S = 60.0
-CHROMIUM_S = 480.0
+CHROMIUM_S = 900.0
 """Until it shows a picture: 100 s beside other work, and at times it has to be started again."""
 ENDS_TRACK_S = 10.0
 """Chromium ends a track after so long without a picture."""
