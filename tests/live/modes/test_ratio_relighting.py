@@ -50,6 +50,9 @@ REST = np.array([0.5, 0.4, 0.3], np.float32)
 """A factor for somebody whose face does not tell their light."""
 
 
+NEUTRAL = np.ones(3, np.float32)
+
+
 class KnownRoom:
     """Gives a light that is known."""
 
@@ -86,7 +89,7 @@ def face_light(
     assert motion.pose is not None
     positions = ratio.positions(motion, motion.pose, frame.size)
     pictures = ratio.raised_lights(relit, under_room)
-    return FaceLight(np.ones(3, np.float32), pictures, positions, SCHEME.eye_span(motion.landmarks))
+    return FaceLight(NEUTRAL, NEUTRAL, pictures, positions, SCHEME.eye_span(motion.landmarks))
 
 
 def planned(ratio: RatioRelighting, frame: Frame, light: FaceLight, presence: float = 1.0) -> FramePlan:

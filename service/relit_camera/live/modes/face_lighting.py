@@ -121,7 +121,7 @@ class FaceLighting:
         with self._timer.stage("follow"):
             positions = relighting.positions(motion, motion.pose, frame.size)
             eye_distance = face.scheme.eye_span(motion.landmarks)
-            light = FaceLight(room.gain, pictures, positions, eye_distance)
+            light = FaceLight(room.gain, room.cast(self._tint), pictures, positions, eye_distance)
             return LitFace(mean, FacePlan(relighting, relighting.aligned(frame, light, presence), presence))
 
     def _is_followed(self, motion: FaceMotion) -> bool:

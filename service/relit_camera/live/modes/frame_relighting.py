@@ -24,6 +24,14 @@ EXTRAPOLATION_CELLS, WIDE_REDUCTION = 45, 4
 """The extrapolation beyond the person is computed for so many there, and its wide blurs for fewer by a factor."""
 
 
+CAST_KEPT = 0.7
+"""Share of the room's color that what is no skin keeps, in logarithms: it is known by the skin, whose own color is a
+guess, and on a grey sweater an error is seen as green."""
+SKIN_HUE, REDDER = 0.25, 0.35
+"""Distance of logarithms of colors from the face's within which a cell is skin as well, and what counts of it toward
+red: ears are redder, and what is red is not seen to be off."""
+
+
 @dataclass(frozen=True)
 class FacePlan:
     """How one face of a frame is relit.
@@ -128,6 +136,7 @@ class FrameRelighting:
             told = [face.relighting.cells(image, face.light, box) for face, box in zip(plan.faces, boxes, strict=True)]
             shares = [face.presence for face in plan.faces]
             factor, added = _combined(image, step, factor, told, shares)
+            factor *= _cast_kept(image, step, plan.faces, told)
             if plan.first is not None:
                 left, top, right, bottom = boxes[0]
                 person = np.zeros((rows, columns), np.float32)
@@ -172,6 +181,36 @@ def _combined(
         added[inside] += cv2.multiply(calm, cells.smooth)
     factor = np.asarray(cv2.addWeighted(factor, presence, rest, 1 - presence, 0), np.float32)
     return factor, np.asarray(added * np.float32(presence), np.float32)
+
+
+def _cast_kept(
+    image: DisplayImage, step: int, faces: tuple[FacePlan, ...], told: list[FaceCells]
+) -> NDArray[np.float32]:
+    """Roots of the color of the room's light that cells keep, (rows, columns, 3): 1 on skin."""
+    rows, columns = (-(-side // step) for side in image.shape[:2])
+    live, _ = live_cells(image, step, (0, 0, columns, rows))
+    hue = _hue(live)
+    skin = np.zeros((rows, columns), np.float32)
+    for cells in told:
+        left, top, right, bottom = cells.box
+        inside = np.s_[top:bottom, left:right]
+        on_face = cells.source.face * cells.source.confidence
+        seen = on_face * cells.source.skin > 0.5
+        if not seen.any():
+            continue
+        away = hue - np.median(hue[inside][seen], axis=0)
+        away[..., 0] *= np.where(away[..., 0] > 0, np.float32(REDDER), 1)
+        skin = np.maximum(skin, np.exp(-np.einsum("rci,rci->rc", away, away) / SKIN_HUE**2))
+        skin[inside] = np.maximum(skin[inside], on_face)
+    cast = np.mean([np.log(np.maximum(face.light.cast, 1e-3)) for face in faces], axis=0)
+    other = 1 - cv2.GaussianBlur(skin, (0, 0), 1.0)
+    return np.asarray(np.exp(other[..., None] * (CAST_KEPT / POWER * cast)), np.float32)
+
+
+def _hue(roots: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Logarithms (rows, columns, 2) of red and blue light over green; roots are (rows, columns, 3)."""
+    light = POWER * np.log(np.maximum(roots, np.float32(0.05)))
+    return np.asarray(light[..., ::2] - light[..., 1:2], np.float32)
 
 
 def _pixels_of(cells: Box, step: int, size: tuple[int, int]) -> Box:

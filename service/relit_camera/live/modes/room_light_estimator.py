@@ -19,7 +19,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.base.images.color import linear_from_uint8
+from relit_camera.base.images.color import LUMINANCE, linear_from_uint8
 from relit_camera.base.images.image_types import DisplayImage, Points
 from relit_camera.base.rotations import Rotation
 from relit_camera.face.landmarks.landmark_triangulation import delaunay_triangles
@@ -29,6 +29,7 @@ from relit_camera.light.directions import (
     texel_directions,
     texel_solid_angles,
 )
+from relit_camera.light.exposure import facing_light
 from relit_camera.light.light_map import LightMap
 from relit_camera.light.soft_lights import SoftLights, regularized_nnls
 from relit_camera.light.spherical_harmonics import basis
@@ -100,6 +101,14 @@ class RoomLightEstimate:
     gain: NDArray[np.float32]
     residual: float
     skin: NDArray[np.float32]
+
+    def cast(self, tint: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
+        """The color (3,) of the light that faces the camera, in this frame's exposure, of luminance 1.
+
+        `tint` (3,) is the color of the skin beside that of the subject's; None for the same.
+        """
+        color = facing_light(self.light_map) * self.gain / (1 if tint is None else tint)
+        return np.asarray(color / max(float(color @ LUMINANCE), 1e-6), np.float32)
 
 
 @dataclass(frozen=True)

@@ -89,7 +89,7 @@ class LiveRatio:
         """The last frame, as the program shows it in a light in display exposure."""
         maps = np.stack([rotate_light_map(light, self._turn) * self._gain, self._room.in_head_frame(self._turn)])
         pictures = self._relighting.raised_lights(*self._relighter.relight(maps))
-        face = FaceLight(self._room.gain, pictures, self._positions, self._eye_distance)
+        face = FaceLight(self._room.gain, self._room.cast(), pictures, self._positions, self._eye_distance)
         rest = self._relighting.mean_factor(pictures, self._room.gain)
         frame, presence = self._last.frame, float(self._last.motion.presence)
         aligned = self._relighting.aligned(frame, face, presence)
