@@ -24,9 +24,9 @@ EXTRAPOLATION_CELLS, WIDE_REDUCTION = 45, 4
 """The extrapolation beyond the person is computed for so many there, and its wide blurs for fewer by a factor."""
 
 
-CAST_KEPT = 0.7
-"""Share of the room's color that what is no skin keeps, in logarithms: it is known by the skin, whose own color is a
-guess, and on a grey sweater an error is seen as green."""
+CAST_KEPT, MOST_KEPT = 0.7, 0.25
+"""Share of the room's color that what is no skin keeps, in logarithms, and the most of a channel: it is known by the
+skin, whose own color is a guess, and on a grey sweater an error is seen as green. Skin differs no more than that."""
 SKIN_HUE, REDDER = 0.25, 0.35
 """Distance of logarithms of colors from the face's within which a cell is skin as well, and what counts of it toward
 red: ears are redder, and what is red is not seen to be off."""
@@ -202,9 +202,10 @@ def _cast_kept(
         away[..., 0] *= np.where(away[..., 0] > 0, np.float32(REDDER), 1)
         skin = np.maximum(skin, np.exp(-np.einsum("rci,rci->rc", away, away) / SKIN_HUE**2))
         skin[inside] = np.maximum(skin[inside], on_face)
-    cast = np.mean([np.log(np.maximum(face.light.cast, 1e-3)) for face in faces], axis=0)
+    cast = CAST_KEPT * np.mean([np.log(np.maximum(face.light.cast, 1e-3)) for face in faces], axis=0)
+    kept = np.clip(cast, -MOST_KEPT, MOST_KEPT) / POWER
     other = 1 - cv2.GaussianBlur(skin, (0, 0), 1.0)
-    return np.asarray(np.exp(other[..., None] * (CAST_KEPT / POWER * cast)), np.float32)
+    return np.asarray(np.exp(other[..., None] * kept), np.float32)
 
 
 def _hue(roots: NDArray[np.float32]) -> NDArray[np.float32]:
