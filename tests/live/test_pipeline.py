@@ -29,7 +29,6 @@ from relit_camera.capture.instant.anyone import anyone
 from relit_camera.face.face_state import LOST, FaceState, FaceStatus, Tracker
 from relit_camera.face.head_pose import project
 from relit_camera.face.identity.face_embedder import FaceEmbedder
-from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme
 from relit_camera.face.matting import Matting
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.lab.bench.synthetic_tracker import SyntheticTracker
@@ -47,7 +46,7 @@ from relit_camera.subject.relighting.relighter import Relighter, open_relighter
 from relit_camera.subject.subject import ANYONE, Subject
 from relit_camera.subject.subject_file import read_subject
 from tests.generated_subject import small_subject
-from tests.small_camera import SIZE, SteadyTracker, difference, grey
+from tests.small_camera import SIZE, Embedder, SteadyTracker, difference, grey
 
 HIDDEN = 7
 """Of the placeholder for somebody else, in every pixel."""
@@ -150,20 +149,6 @@ def textured() -> np.ndarray:
     """Grey with a pattern that no noise has."""
     noise = np.random.default_rng(4).normal(0, 120, (SIZE[1], SIZE[0], 1)).repeat(3, axis=2)
     return np.clip(grey(120) + cv2.GaussianBlur(noise, (0, 0), 2.5), 0, 255).astype(np.uint8)
-
-
-class Embedder(FaceEmbedder):
-    """Whoever is before the camera is `distance` from the subject."""
-
-    def __init__(self, distance: float) -> None:
-        self.distance, self.looks = distance, 0
-
-    def embed(self, image: np.ndarray, landmarks: np.ndarray, scheme: LandmarkScheme) -> np.ndarray:
-        self.looks += 1
-        return np.eye(1, 128, dtype=np.float32)[0] * np.float32(self.distance)
-
-    def reference_embedding(self, subject: Subject) -> np.ndarray:
-        return np.zeros(128, np.float32)
 
 
 @pytest.mark.parametrize(("distance", "other"), [(0.3, False), (0.8, True)])
