@@ -68,6 +68,7 @@ def test_others_move_a_portrait_once_that_is_confirmed_and_until_it_is_stopped(
     part, button = panel.page.locator("#avatar"), panel.page.locator("#avatar-allow")
     expect(part).to_be_hidden()
     fake.show_to_another()
+    expect(button).to_be_visible()
     button.press("Enter")
     expect(panel.page.locator("#ask-words")).to_contain_text("consent")
     panel.page.locator("#ask-cancel").click()
