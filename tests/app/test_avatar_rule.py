@@ -22,11 +22,12 @@ def patched(camera: Camera, **changes: object) -> None:
     camera.http.patch("scene", json=changes).raise_for_status()
 
 
-def after(camera: Camera, pictures: int = int(FPS)) -> list[DisplayImage]:
-    """The pictures that are published from now on."""
-    camera.sink.new.clear()
+def after(camera: Camera) -> list[DisplayImage]:
+    """The pictures that are published in the next second, without one that is on its way."""
     count = camera.sink.count
-    wait_until(lambda: camera.sink.count >= count + pictures)
+    wait_until(lambda: camera.sink.count >= count + 2)
+    camera.sink.new.clear()
+    wait_until(lambda: camera.sink.count >= count + 2 + FPS)
     return list(camera.sink.new)
 
 
@@ -35,8 +36,9 @@ def test_a_portrait_is_hidden_from_who_it_is_not(tmp_path: Path, monkeypatch: py
     hidden, ada = placeholder(SIZE, OTHER_PERSON_MESSAGE), small_subject()
     bea = replace(ada, metadata=ada.metadata.model_copy(update={"created_at": "2027-01-01"}))
     with running_camera(tmp_path, tracker=SyntheticTracker()) as camera:
-        write_subject(camera.scene_controller.subjects.new_path("bea"), bea)
-        for _ in range(2):
+        for name, subject in {"ada": ada, "bea": bea}.items():
+            write_subject(camera.scene_controller.subjects.new_path(name), subject)
+        for name in ("bea", "ada"):
             wait_until(lambda: camera.status()["state"] == "other-person")
             assert [difference(picture, hidden) for picture in after(camera)] == [0]
             assert DegradationCode.OTHER_PERSON in camera.degraded()
@@ -46,6 +48,7 @@ def test_a_portrait_is_hidden_from_who_it_is_not(tmp_path: Path, monkeypatch: py
             assert len(moved) > FPS / 2
             assert min(difference(picture, hidden) for picture in moved) > 5
             assert camera.degraded() == set()
-            patched(camera, subject="bea")  # who may move one person's portrait may not move another's
+            patched(camera, subject=name)  # who may move one person's portrait may not move another's
+        wait_until(lambda: camera.status()["state"] == "other-person")
         patched(camera, subject=None)
         wait_until(lambda: camera.degraded() == {DegradationCode.NO_SUBJECT})

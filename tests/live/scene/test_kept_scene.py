@@ -210,6 +210,8 @@ def test_that_others_may_move_the_portrait_is_not_kept_and_counts_for_whoever_is
     run(settings(folder), change)
     again = run(settings(folder))
     assert (again.subject_name, again.avatar_allowed) == ("bea", False)
+    first = run(settings(folder, output=OutputSettings(avatar_allowed=True)))
+    assert (first.subject_name, first.avatar_allowed) == ("bea", True)
     allowed = settings(folder, subject="ada", output=OutputSettings(avatar_allowed=True))
     for given in (NOTHING_GIVEN, GivenOptions(subject=True), None):
         assert run(allowed, given=given).avatar_allowed

@@ -354,9 +354,11 @@ def test_the_portrait_of_a_renamed_person_may_still_be_moved(avatar: SceneContro
 
 
 def test_no_step_back_or_forward_lets_others_move_a_portrait(avatar: SceneController) -> None:
+    avatar.set_look(Look(lighting=Lighting(yaw_deg=5)))
     avatar.set_avatar_allowed(False)
     steps = (avatar.undo, avatar.undo, avatar.redo, avatar.redo, avatar.reset)
     assert [step().avatar_allowed for step in steps] == [False] * 5
+    avatar.set_look(Look(lighting=Lighting(yaw_deg=10)))
     avatar.set_avatar_allowed(True)
     assert not avatar.undo().avatar_allowed, "a step back takes the permission back"
 
