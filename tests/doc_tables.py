@@ -96,13 +96,13 @@ FACES = {
 
 
 def _shown_text() -> str:
-    rows = "| pictures | face | live | portrait |\n|---|---|---|---|\n"
+    rows = "| pictures | face | live | portrait | portrait, known to be somebody else |\n|---|---|---|---|---|\n"
     for rendering, face in product(Rendering, FacePresence):
         if rendering is not Rendering.WORKS and face is not FacePresence.FOLLOWED:
             continue
         cells = [PICTURES[rendering], FACES[face] if rendering is Rendering.WORKS else "any"]
-        for mode in (Mode.LIVE, Mode.PORTRAIT):
-            now = Situation(mode, face, rendering=rendering)
+        for mode, other_person in ((Mode.LIVE, False), (Mode.PORTRAIT, False), (Mode.PORTRAIT, True)):
+            now = Situation(mode, face, rendering=rendering, other_person=other_person)
             kinds = [what_is_shown(replace(now, can_rest=can_rest)) for can_rest in (True, False)]
             cells.append(", else ".join(f"`{kind}`" for kind in dict.fromkeys(kinds)))
         rows += f"| {' | '.join(cells)} |\n"

@@ -79,6 +79,7 @@ def render_scenes(
         settings = RelitSettings.model_validate({"tracker": {"name": tracker}})
         controller = SceneController(settings.storage)
         controller.load_configured_subject(str(subject))
+        controller.set_avatar_allowed(True)
         controller.set_look(
             Look.model_validate(
                 {

@@ -21,6 +21,8 @@ from relit_camera.devices.sinks.sink import NullSink
 from relit_camera.devices.sources.playback_source import PlaybackSource, TimedImage
 from relit_camera.devices.sources.source import Source, SourceInfo
 from relit_camera.face.face_state import FaceState, Tracker
+from relit_camera.face.identity.face_embedder import FaceEmbedder
+from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme
 from relit_camera.lab.bench.synthetic_tracker import SyntheticTracker
 from relit_camera.live.scene.scene_controller import SceneController
 from relit_camera.live.status.camera_status import Degradation, DegradationCode
@@ -41,6 +43,20 @@ class SteadyTracker(SyntheticTracker):
 
     def track(self, frame: Frame) -> FaceState:
         return super().track(Frame(frame.image, frame.index, frame.captured_at, 0.0))
+
+
+class Embedder(FaceEmbedder):
+    """Whoever is before the camera is `distance` from the subject."""
+
+    def __init__(self, distance: float) -> None:
+        self.distance, self.looks = distance, 0
+
+    def embed(self, image: np.ndarray, landmarks: np.ndarray, scheme: LandmarkScheme) -> np.ndarray:
+        self.looks += 1
+        return np.eye(1, 128, dtype=np.float32)[0] * np.float32(self.distance)
+
+    def reference_embedding(self, subject: Subject) -> np.ndarray:
+        return np.zeros(128, np.float32)
 
 
 def grey(value: int = 120, size: tuple[int, int] = SIZE) -> DisplayImage:

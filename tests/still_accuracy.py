@@ -82,6 +82,7 @@ def relit(subject: Path, clip: Path, environment: str, mode: Mode) -> list[Displ
     settings = RelitSettings().model_copy(update={"tracker": TrackerSettings(name="mesh")})
     controller = SceneController(settings.storage)
     controller.load_configured_subject(str(subject))
+    controller.set_avatar_allowed(True)
     lighting = parse_lighting(controller.register_temporary_environment(environment), "0,0,0", 0.0)
     controller.set_look(Look(lighting=lighting, background=parse_background("none"), mode=mode))
     tracker = make_tracker(settings)

@@ -75,6 +75,7 @@ def test_a_listener_first_gets_what_stands(listener: Listener, camera: FakeCamer
         "subject": None,
         "rung": None,
         "unlit_allowed": False,
+        "avatar_allowed": False,
         "frozen": False,
         "can_undo": False,
         "can_redo": False,

@@ -183,6 +183,21 @@ def test_undo_redo_and_reset_never_allow_it(client: Client) -> None:
         assert (body["lighting"]["split"], body["unlit_allowed"]) == (0, False), way
 
 
+# Nobody else moves a portrait unasked
+
+
+def test_a_person_can_let_others_move_the_portrait_of_one_subject(client: Client, camera: FakeCamera, ada: str) -> None:
+    assert not patch(client, subject=ada, mode="portrait")["avatar_allowed"]
+    assert patch(client, avatar_allowed=True)["avatar_allowed"]
+    assert camera.scene_controller.scene.avatar_allowed
+    assert patch(client, lighting={"yaw_deg": 5})["avatar_allowed"]
+    client.put("/api/v1/subject", {"name": None})
+    assert not client.get(SCENE).json()["avatar_allowed"]
+    assert patch(client, subject=ada, avatar_allowed=True)["avatar_allowed"]
+    assert not patch(client, avatar_allowed=False)["avatar_allowed"]
+    check_problem(client.patch(SCENE, {"avatar_allowed": 1}), 422)
+
+
 def test_a_file_named_on_the_command_line_can_be_chosen_again(
     client: Client, camera: FakeCamera, tmp_path: Path, ada: str
 ) -> None:

@@ -21,6 +21,7 @@ from relit_camera.app.demo import demo_files
 from relit_camera.base.config.settings import RelitSettings, ServerSettings, StorageSettings
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.models.model_store import FOLDER_VARIABLE
+from relit_camera.live.status.camera_status import Degradation, DegradationCode
 from relit_camera.live.status.setup_status import Check
 from relit_camera.subject.subject_file import write_subject
 from tests.api.fake_camera import FakeCamera
@@ -101,6 +102,12 @@ class FakeServer(Api):
         """Publish the webcam's own picture, as somebody has asked for who has no subject."""
         self.patch("scene", subject=None, unlit_allowed=True)
         self.camera.base = replace(self.camera.base, unlit=True)
+
+    def show_to_another(self) -> None:
+        """Let somebody else be before the camera than the subject, whose portrait is hidden from them."""
+        self.patch("scene", mode="portrait")
+        other = Degradation("a placeholder is shown", "somebody else", code=DegradationCode.OTHER_PERSON)
+        self.camera.degraded = [other]
 
     def show_checks(self, *checks: Check) -> None:
         """Let these be what the camera's checks find."""

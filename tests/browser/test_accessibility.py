@@ -92,6 +92,11 @@ def open_stills_dialog(panel: Panel) -> None:
     expect(panel.page.locator("#stills-dialog")).to_be_visible()
 
 
+def open_avatar_dialog(panel: Panel) -> None:
+    panel.page.locator("#avatar-allow").click()
+    expect(panel.page.locator("#ask")).to_be_visible()
+
+
 def open_checklist(panel: Panel) -> None:
     expect(panel.page.locator("#checklist")).to_be_visible()
     panel.page.locator("#checklist summary").first.click()
@@ -106,6 +111,7 @@ OPENED: dict[str, Callable[[Panel], None]] = {
     "my face": open_face_dialog,
     "expression stills": open_stills_dialog,
     "checklist": open_checklist,
+    "somebody else's portrait": open_avatar_dialog,
 }
 """How dialogs, menus and parts that are not always there are opened."""
 
@@ -114,6 +120,7 @@ OPENED: dict[str, Callable[[Panel], None]] = {
 def test_what_opens_over_the_panel(fake: FakeServer, open_page: OpenPage, name: str) -> None:
     fake.patch("lighting", lamps=LAMPS)
     fake.http.put("presets/evening").raise_for_status()
+    fake.show_to_another()
     panel = open_panel(open_page, fake.url)
     expect(panel.lamp(1)).to_be_visible()
     OPENED[name](panel)

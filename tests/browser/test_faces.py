@@ -61,6 +61,52 @@ def test_hiding_the_unlit_picture_at_once_leads_back_too_and_keeps_the_keyboard(
     wait_until(lambda: panel.what_has_the_focus() != "")
 
 
+def test_others_move_a_portrait_once_that_is_confirmed_and_until_it_is_stopped(
+    fake: FakeServer, open_page: OpenPage
+) -> None:
+    panel = open_panel(open_page, fake.url)
+    part, button = panel.page.locator("#avatar"), panel.page.locator("#avatar-allow")
+    expect(part).to_be_hidden()
+    fake.show_to_another()
+    expect(button).to_be_visible()
+    button.press("Enter")
+    expect(panel.page.locator("#ask-words")).to_contain_text("consent")
+    panel.page.locator("#ask-cancel").click()
+    assert fake.get("scene")["avatar_allowed"] is False
+    button.press("Enter")
+    panel.page.locator("#ask-ok").click()
+    fake.wait_for("scene", avatar_allowed=True)
+    fake.camera.degraded = []
+    for mode in ("portrait", "live"):
+        fake.patch("scene", mode=mode)
+        expect(part).to_contain_text(f"Anybody may move the portrait of “{SUBJECT}”")
+    button.press("Enter")
+    fake.wait_for("scene", avatar_allowed=False)
+    expect(part).to_be_hidden()
+
+
+def test_who_is_lit_as_a_mean_head_is_not_asked_about_a_portrait(fake: FakeServer, open_page: OpenPage) -> None:
+    panel = open_panel(open_page, fake.url)
+    fake.show_to_another()
+    expect(panel.page.locator("#avatar")).to_be_visible()
+    fake.patch("scene", mode="live")
+    expect(panel.page.locator("#avatar")).to_be_hidden()
+
+
+def test_a_permission_asked_for_one_face_is_not_given_to_another(fake: FakeServer, open_page: OpenPage) -> None:
+    store(fake, "other")
+    panel = open_panel(open_page, fake.url)
+    fake.show_to_another()
+    panel.page.locator("#avatar-allow").click()
+    fake.patch("scene", subject="other")
+    expect(panel.face("other")).to_have_attribute("aria-pressed", "true")
+    panel.page.locator("#ask-ok").click()
+    expect(panel.page.locator("#ask")).to_be_hidden()
+    fake.patch("scene", mode="live")
+    expect(panel.page.locator("#avatar")).to_be_hidden()
+    assert fake.get("scene")["avatar_allowed"] is False
+
+
 def test_a_face_that_is_gone_does_not_keep_the_unlit_picture(fake: FakeServer, open_page: OpenPage) -> None:
     panel = open_panel(open_page, fake.url)
     show_unlit(fake, panel)

@@ -9,12 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from relit_camera.app import wiring
 from relit_camera.base.config.look import Mode
 from relit_camera.base.images.image_files import read_display
 from relit_camera.base.video.video_readers import VideoReader
 from relit_camera.cli.arguments import parse_mode
 from relit_camera.cli.main import COMMANDS
 from tests.cli.relit_command import CLIP_FPS, CLIP_SIZE, Answer, Material, call, files, finish
+from tests.small_camera import Embedder
 from tests.synthetic import sphere_samples, write_lights
 
 FRAMES = 40
@@ -50,6 +52,25 @@ def test_replay_writes_video_report_and_sheet(given: str, mode: str, material: M
     assert {each["code"] for each in report["degraded"]} <= {"room-not-parted"}  # tests do without the matte's model
     assert all(value > 0 for value in report["frames"][1]["stage_ms"].values())
     assert read_display(tmp_path / "sheet.png").std() > 10
+
+
+@pytest.mark.parametrize("allowed", [False, True])
+def test_somebody_else_moves_the_portrait_of_a_replay_where_that_is_allowed(
+    allowed: bool, material: Material, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(wiring, "FaceEmbedder", lambda session: Embedder(0.8))
+    answer = done(
+        call(
+            "replay", material.clip, "--subject", material.subject, "--environment", "window", "--mode", "portrait",
+            "--tracker", material.tracker, "--out", tmp_path / "out.mp4", "--report", tmp_path / "report.json",
+            *(["--avatar"] if allowed else []),
+        )
+    )  # fmt: skip
+    report = json.loads((tmp_path / "report.json").read_text())
+    hidden = [frame["shown"] for frame in report["frames"]].count("placeholder")
+    assert (f"a placeholder, for somebody else than the subject, in {hidden}" in answer.out) is not allowed
+    assert [each["code"] for each in report["degraded"]] == ["other-person"] * (not allowed)
+    assert hidden == 0 if allowed else FRAMES / 2 < hidden < FRAMES
 
 
 def test_track_plays_back_as_it_was_recorded(material: Material, tmp_path: Path) -> None:

@@ -13,7 +13,9 @@ from pathlib import Path
 import httpx
 import pytest
 
+from relit_camera.app.first_scene import FirstScene
 from relit_camera.live.publishing.publisher import RETRY_S
+from relit_camera.live.scene.scene import Scene
 from tests.cli.relit_command import Answer, Material, call, finish, start
 from tests.lateness import spinning
 from tests.small_camera import WAIT_S, wait_until
@@ -183,6 +185,21 @@ def refused(material: Material, tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setenv("RELIT_MODELS_DIR", str(tmp_path / "no-models"))
     monkeypatch.setattr(signal, "signal", lambda *_: None)
     return lambda *options: call(*arguments(material, *options))
+
+
+@pytest.mark.parametrize("options", [(), ("--avatar",), ("--unlit",)])
+def test_what_is_allowed_from_the_start(
+    options: tuple[str, ...], material: Material, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    began: list[Scene] = []
+
+    def run_camera(*_: object, first_scene: FirstScene, **more: object) -> None:
+        began.append(first_scene.controller().scene)
+
+    monkeypatch.setattr("relit_camera.app.run_camera.run_camera", run_camera)
+    assert call("run", "--subject", material.subject, "--tracker", material.tracker, *options).code == 0
+    assert began[0].subject_name == material.subject.stem
+    assert (began[0].avatar_allowed, began[0].unlit_allowed) == ("--avatar" in options, "--unlit" in options)
 
 
 def test_port_in_use(refused: Callable[..., Answer]) -> None:

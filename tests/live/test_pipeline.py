@@ -5,19 +5,23 @@ from __future__ import annotations
 import gc
 import threading
 import weakref
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
+from relit_camera.app.demo import demo_files
 from relit_camera.app.wiring import make_follower, make_pipeline, mode_factories
 from relit_camera.base.config.look import ColorBackground, Lamp, Lighting, Look, Mode
-from relit_camera.base.config.settings import InferenceSettings, RelitSettings
+from relit_camera.base.config.settings import InferenceSettings, OutputSettings, RelitSettings
 from relit_camera.base.errors import ModelError
+from relit_camera.base.images.image_files import write_display
 from relit_camera.base.images.image_types import Alpha, Frame
 from relit_camera.base.models.model_store import FOLDER_VARIABLE
 from relit_camera.base.rotations import Rotation, angles_from_rotation, rotation_from_angles
@@ -25,12 +29,12 @@ from relit_camera.capture.instant.anyone import anyone
 from relit_camera.face.face_state import LOST, FaceState, FaceStatus, Tracker
 from relit_camera.face.head_pose import project
 from relit_camera.face.identity.face_embedder import FaceEmbedder
-from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme
+from relit_camera.face.matting import Matting
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.lab.bench.synthetic_tracker import SyntheticTracker
 from relit_camera.light.environments.builtin.builtin_environments import builtin_environment
 from relit_camera.live.modes.frame_fitting import fit_frame
-from relit_camera.live.modes.mode import ModeContext, RenderedFrame, RenderTask
+from relit_camera.live.modes.mode import ModeContext, ModeFactory, RenderedFrame, RenderTask
 from relit_camera.live.modes.scene_relighting import SceneRelighting
 from relit_camera.live.pipeline import Pipeline, subject_troubles
 from relit_camera.live.publishing.what_is_shown import Shown
@@ -40,9 +44,12 @@ from relit_camera.live.scene.scene import Scene
 from relit_camera.live.status.camera_status import DegradationCode
 from relit_camera.subject.relighting.relighter import Relighter, open_relighter
 from relit_camera.subject.subject import ANYONE, Subject
+from relit_camera.subject.subject_file import read_subject
 from tests.generated_subject import small_subject
-from tests.small_camera import SIZE, SteadyTracker, difference, grey
+from tests.small_camera import SIZE, Embedder, SteadyTracker, difference, grey
 
+HIDDEN = 7
+"""Of the placeholder for somebody else, in every pixel."""
 CPU = RelitSettings(inference=InferenceSettings(provider="cpu"))
 STUDIO = builtin_environment("studio")
 LAMP_RIGHT = Lighting(environment=None, lamps=(Lamp(azimuth_deg=90, elevation_deg=0),), transition_s=0)
@@ -116,39 +123,38 @@ def test_nobody_chosen_is_nobody_shown(mode: Mode) -> None:
     assert not whoever_comes().shows_nobody
 
 
+def pipeline_of(
+    tracker: Tracker,
+    modes: Mapping[Mode, ModeFactory] | None = None,
+    open_matte: Callable[[], Matting] = pytest.fail,
+    open_embedder: Callable[[], FaceEmbedder] = no_embedder,
+    is_nobodys: bool = False,
+) -> Pipeline:
+    """A pipeline of which some parts are given."""
+    return Pipeline(
+        tracker,
+        partial(make_follower, CPU.tracker, tracker),
+        SIZE,
+        modes or mode_factories(CPU),
+        partial(open_relighter, "basis"),
+        open_matte,
+        anyone,
+        open_embedder,
+        lambda _: is_nobodys,
+        lambda: np.full((SIZE[1], SIZE[0], 3), HIDDEN, np.uint8),
+    )
+
+
 def textured() -> np.ndarray:
     """Grey with a pattern that no noise has."""
     noise = np.random.default_rng(4).normal(0, 120, (SIZE[1], SIZE[0], 1)).repeat(3, axis=2)
     return np.clip(grey(120) + cv2.GaussianBlur(noise, (0, 0), 2.5), 0, 255).astype(np.uint8)
 
 
-class Embedder(FaceEmbedder):
-    """Whoever is before the camera is `distance` from the subject."""
-
-    def __init__(self, distance: float) -> None:
-        self.distance, self.looks = distance, 0
-
-    def embed(self, image: np.ndarray, landmarks: np.ndarray, scheme: LandmarkScheme) -> np.ndarray:
-        self.looks += 1
-        return np.eye(1, 128, dtype=np.float32)[0] * np.float32(self.distance)
-
-    def reference_embedding(self, subject: Subject) -> np.ndarray:
-        return np.zeros(128, np.float32)
-
-
 @pytest.mark.parametrize(("distance", "other"), [(0.3, False), (0.8, True)])
 def test_somebody_else_than_the_subject_is_lit_as_anybody_would_be(distance: float, other: bool) -> None:
-    tracker, embedder = SteadyTracker(), Embedder(distance)
-    made = Pipeline(
-        tracker,
-        partial(make_follower, CPU.tracker, tracker),
-        SIZE,
-        mode_factories(CPU),
-        partial(open_relighter, "basis"),
-        pytest.fail,
-        anyone,
-        lambda: embedder,
-    )
+    embedder = Embedder(distance)
+    made = pipeline_of(SteadyTracker(), open_embedder=lambda: embedder)
     made._compositor.person_alpha = lambda *_: None  # type: ignore[method-assign]
     chosen = scene(mode=Mode.LIVE, lighting=LAMP_LEFT.model_dump())
     rendered = [made.process(frame(index, textured()), chosen) for index in range(60)]
@@ -160,6 +166,90 @@ def test_somebody_else_than_the_subject_is_lit_as_anybody_would_be(distance: flo
     unchosen = replace(chosen, subject=None, subject_name=ANYONE)
     expected = [as_anybody.process(frame(index, textured()), unchosen) for index in range(60)][-1]
     assert (difference(rendered[-1].image, expected.image) < 1) is other
+
+
+class Coming(SteadyTracker):
+    """Loses the face from frame 30 to 60: for longer than whoever was there is remembered."""
+
+    def track(self, frame: Frame) -> FaceState:
+        return LOST if 30 <= frame.index < 60 else super().track(frame)
+
+
+def kinds(made: Pipeline, shown: Scene, frames: range) -> list[Shown]:
+    return [made.process(frame(index, textured()), shown).shown for index in frames]
+
+
+def test_nobody_else_moves_the_portrait() -> None:
+    """A placeholder, drawn once, from when it is known to be somebody else until it is known to be the subject."""
+    embedder = Embedder(0.8)
+    made, chosen = pipeline_of(Coming(), open_embedder=lambda: embedder), scene()
+    assert kinds(made, chosen, range(5)) == [Shown.RELIT] * 5  # not known yet
+    kinds(made, chosen, range(5, 20))
+    hidden = [made.process(frame(index, textured()), chosen) for index in (20, 21)]
+    assert [(each.shown, each.other_person) for each in hidden] == [(Shown.PLACEHOLDER, True)] * 2
+    assert hidden[0].image is hidden[1].image
+    assert (hidden[0].image == HIDDEN).all()
+    (trouble,) = made.troubles
+    assert (trouble.code, trouble.what) == (DegradationCode.OTHER_PERSON, "a placeholder is shown")
+    assert "others" in trouble.cure
+    assert set(kinds(made, chosen, range(22, 62))) == {Shown.PLACEHOLDER}  # also where the face was away
+    embedder.distance = 0.3
+    back = kinds(made, chosen, range(62, 200))
+    assert back[-1] is Shown.RELIT
+    assert back == sorted(back, key=[Shown.PLACEHOLDER, Shown.RELIT].index)
+    assert made.troubles == []
+
+
+@pytest.mark.parametrize(
+    ("embedder", "allowed", "nobodys", "known"),
+    [
+        (lambda: Embedder(0.3), False, False, False),
+        (no_embedder, False, False, False),
+        (lambda: Embedder(0.8), True, False, True),
+        (lambda: Embedder(0.8), False, True, False),
+    ],
+    ids=["the same", "unknown", "allowed", "nobody's"],
+)
+def test_the_portrait_moves(embedder: Callable[[], FaceEmbedder], allowed: bool, nobodys: bool, known: bool) -> None:
+    made = pipeline_of(SteadyTracker(), open_embedder=embedder, is_nobodys=nobodys)
+    shown = replace(scene(), avatar_allowed=allowed)
+    rendered = [made.process(frame(index, textured()), shown) for index in range(30)]
+    assert {each.shown for each in rendered} == {Shown.RELIT}
+    assert (rendered[-1].other_person, made.troubles) == (known, [])
+
+
+def test_leave_to_move_the_portrait_counts_at_once_and_so_does_its_end() -> None:
+    made, chosen = pipeline_of(SteadyTracker(), open_embedder=lambda: Embedder(0.8)), scene()
+    allowed = replace(chosen, avatar_allowed=True)
+    kinds(made, chosen, range(20))
+    assert kinds(made, allowed, range(20, 22)) == [Shown.RELIT] * 2
+    assert kinds(made, chosen, range(22, 24)) == [Shown.PLACEHOLDER] * 2
+
+
+def test_somebody_else_than_one_subject_is_not_yet_somebody_else_than_another() -> None:
+    made, chosen = pipeline_of(SteadyTracker(), open_embedder=lambda: Embedder(0.55)), scene()
+    made._not_them = chosen.subject  # near the threshold what was known stays
+    assert kinds(made, chosen, range(20)) == [Shown.PLACEHOLDER] * 20
+    assert kinds(made, replace(chosen, subject=replace(small_subject())), range(20, 40)) == [Shown.RELIT] * 20
+
+
+def test_the_bundled_person_is_nobodys_and_others_are_somebodys() -> None:
+    is_nobodys, bundled = pipeline()._is_nobodys, read_subject(demo_files.SUBJECT)
+    noted = replace(bundled, metadata=bundled.metadata.model_copy(update=demo_files.SUBJECT_NOTES))
+    another = replace(bundled, metadata=bundled.metadata.model_copy(update={"created_at": "2027-01-01"}))
+    people = [bundled, noted, anyone(), another, small_subject()]
+    assert [is_nobodys(each) for each in people] == [True, True, True, False, False]
+
+
+@pytest.mark.parametrize("own", [False, True], ids=["drawn", "a picture of the user's"])
+def test_what_is_shown_in_place_of_a_portrait(own: bool, tmp_path: Path) -> None:
+    picture = tmp_path / "away.png"
+    write_display(picture, grey(77))
+    settings = CPU.model_copy(update={"output": OutputSettings(placeholder=picture if own else None)})
+    drawn = make_pipeline(settings, SteadyTracker(), SIZE)._draw_other_person()
+    assert drawn.shape == (SIZE[1], SIZE[0], 3)
+    assert (drawn == 77).all() == own
+    assert drawn.max() > 70
 
 
 @pytest.mark.parametrize(
@@ -246,7 +336,7 @@ def test_stages_are_timed() -> None:
     made = pipeline()
     made.process(frame(), scene())
     stages = made.timer.lap_ms()
-    assert set(stages) == {"track", "light", "relight", "follow", "move", "compose"}
+    assert set(stages) == {"track", "identity", "light", "relight", "follow", "move", "compose"}
     assert all(value > 0 for value in stages.values())
 
 
@@ -401,8 +491,7 @@ class OneGrey:
 def with_third_mode(tracker: Tracker) -> Pipeline:
     """A pipeline whose mode live is another: its logic knows no mode by name."""
     modes = {**mode_factories(CPU), Mode.LIVE: OneGrey}
-    follower = partial(make_follower, CPU.tracker, tracker)
-    return Pipeline(tracker, follower, SIZE, modes, partial(open_relighter, "basis"), pytest.fail, anyone, no_embedder)
+    return pipeline_of(tracker, modes)
 
 
 def test_a_third_mode_needs_nothing_of_the_pipeline() -> None:
@@ -440,11 +529,7 @@ class Everywhere:
 
 def test_it_says_when_models_are_opened() -> None:
     """For a subject, for a mode, and when a live person must first be parted from the room."""
-    tracker, said = SteadyTracker(), []
-    follower = partial(make_follower, CPU.tracker, tracker)
-    made = Pipeline(
-        tracker, follower, SIZE, mode_factories(CPU), partial(open_relighter, "basis"), Everywhere, anyone, no_embedder
-    )
+    made, said = pipeline_of(SteadyTracker(), open_matte=Everywhere), []
     made.on_opening = lambda: said.append("opening")
     blurred, other = scene(mode=Mode.LIVE, background={"kind": "blur"}), replace(small_subject())
     live = scene(mode=Mode.LIVE)
@@ -453,8 +538,8 @@ def test_it_says_when_models_are_opened() -> None:
         said.append("picture")
     made.close()
     opened = ["opening", "picture"]
-    first_live = ["opening", "opening", *opened]  # who it is, the mode, the matte
-    assert said == [*opened, "picture", *first_live, "picture", "picture", *opened, *opened]
+    first, first_live = ["opening", *opened], ["opening", *opened]  # who it is, the mode; the mode, the matte
+    assert said == [*first, "picture", *first_live, "picture", "picture", *opened, *opened]
 
 
 def test_it_starts_no_thread() -> None:
@@ -488,8 +573,7 @@ def test_each_frame_is_begun_with_the_quality_of_that_moment() -> None:
 
     tracker = CountingTracker()
     modes = {Mode.PORTRAIT: Noting, Mode.LIVE: Noting}
-    follower = partial(make_follower, CPU.tracker, tracker)
-    made = Pipeline(tracker, follower, SIZE, modes, partial(open_relighter, "basis"), pytest.fail, anyone, no_embedder)
+    made = pipeline_of(tracker, modes)
     noise = np.random.default_rng(0).integers(0, 255, grey().shape).astype(np.uint8)  # flow needs something to follow
     made.process(frame(0, noise), scene())
     before, made.quality = tracker.measured, QUALITY_LEVELS[-1]
@@ -504,8 +588,7 @@ def test_each_frame_is_begun_with_the_quality_of_that_moment() -> None:
 def test_the_running_camera_measures_every_second_face_in_mode_live(mode: Mode, measured: int) -> None:
     tracker = CountingTracker()
     modes = {Mode.PORTRAIT: OneGrey, Mode.LIVE: OneGrey}
-    follower = partial(make_follower, CPU.tracker, tracker)
-    made = Pipeline(tracker, follower, SIZE, modes, partial(open_relighter, "basis"), pytest.fail, anyone, no_embedder)
+    made = pipeline_of(tracker, modes)
     noise = np.random.default_rng(0).integers(0, 255, grey().shape).astype(np.uint8)
     made.quality = QUALITY_LEVELS[0]
     made.process(frame(0, noise), scene(mode=mode))

@@ -76,6 +76,7 @@ def play(case: Case, folder: Path) -> Played:
     )
     scene_controller = SceneController(settings.storage)
     scene_controller.load_configured_subject(str(subject_file(lights, case.gamma)))
+    scene_controller.set_avatar_allowed(True)  # the mannequin is not known by its own subject
     named = case.environment if case.environment in scene_controller.environments.names() else None
     environment = scene_controller.register_temporary_environment(named or str(find(case.environment, folder, "")))
     lighting = Lighting(environment=environment, yaw_deg=case.yaw_deg)

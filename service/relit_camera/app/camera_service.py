@@ -344,7 +344,7 @@ class CameraService:
                 *self._board.degradations(),
                 *unused,
                 *subject_troubles(scene),
-                *(pipeline.troubles if pipeline else ()),
+                *(pipeline.troubles if pipeline and not scene.shows_nobody else ()),
                 *slower,
                 *reduced,
             ],

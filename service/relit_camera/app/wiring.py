@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache, partial
 
+from relit_camera.app.demo.demo_files import is_demo_person
 from relit_camera.base.config.look import Mode
 from relit_camera.base.config.settings import InferenceSettings, RelitSettings, TrackerSettings
 from relit_camera.base.models.session_with_fallback import SessionOptions
@@ -21,11 +22,15 @@ from relit_camera.live.modes.mode import ModeContext, ModeFactory, RenderMode
 from relit_camera.live.modes.portrait_mode import PortraitMode
 from relit_camera.live.modes.ratio_relighting import RatioRelighting, as_large_as_needed
 from relit_camera.live.pipeline import Pipeline
+from relit_camera.live.publishing.placeholder_image import placeholder
 from relit_camera.live.reenactment.dense_motion import DenseMotion
 from relit_camera.live.reenactment.reenactor import REENACTORS, ReenactorContext, open_reenactor
 from relit_camera.live.reenactment.source_image import SourceFace
 from relit_camera.subject.relighting.relighter import RELIGHTERS, open_relighter
 from relit_camera.subject.subject import Subject
+
+OTHER_PERSON_MESSAGE = "this is somebody else's portrait"
+"""What the placeholder says in mode portrait where somebody else than the subject is before the camera."""
 
 
 def session_options(inference: InferenceSettings) -> SessionOptions:
@@ -71,9 +76,11 @@ def make_pipeline(settings: RelitSettings, tracker: Tracker, size: tuple[int, in
         NotFoundError: no relighter, reenactor or matte of the settings' name.
         ConfigError: several packages have a plug-in of that name, or it cannot be imported.
         InputError: `recorded:FILE` names no recorded mattes; or a built-in plug-in takes no argument.
+        ImageError: the placeholder picture cannot be read.
     """
     require_plugins(settings)
     session = session_options(settings.inference)
+    own_picture = placeholder(size, picture=settings.output.placeholder) if settings.output.placeholder else None
     return Pipeline(
         tracker,
         partial(make_follower, settings.tracker, tracker),
@@ -83,6 +90,8 @@ def make_pipeline(settings: RelitSettings, tracker: Tracker, size: tuple[int, in
         open_matting(settings.matte, session),
         _make_anyone,
         partial(FaceEmbedder, session),
+        lambda subject: subject.is_anyone or is_demo_person(subject.metadata),
+        partial(placeholder, size, OTHER_PERSON_MESSAGE) if own_picture is None else lambda: own_picture,
     )
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from relit_camera.base.concurrency.resident_memory import large_allocations_apart
 from relit_camera.base.config.look import Mode, NoBackground
-from relit_camera.base.images.image_types import Frame
+from relit_camera.base.images.image_types import DisplayImage, Frame
 from relit_camera.face.face_state import FaceStatus, Tracker
 from relit_camera.face.identity.face_embedder import FaceEmbedder
 from relit_camera.face.identity.identity_judge import Verdict
@@ -22,7 +22,7 @@ from relit_camera.live.compositing.compositor import Compositor
 from relit_camera.live.modes.frame_fitting import fit_frame
 from relit_camera.live.modes.mode import ModeContext, ModeFactory, RenderedFrame, RenderMode, RenderTask
 from relit_camera.live.modes.scene_relighting import SceneRelighting
-from relit_camera.live.publishing.what_is_shown import Situation, what_is_shown
+from relit_camera.live.publishing.what_is_shown import Shown, Situation, what_is_shown
 from relit_camera.live.reenactment.source_image import SourceFace, find_source_face
 from relit_camera.live.render_quality import FULL_QUALITY, RenderQuality
 from relit_camera.live.scene.light_transition import LightTransition
@@ -81,6 +81,8 @@ class Pipeline:
         open_matte: Callable[[], Matting],
         make_anyone: Callable[[], Subject],
         open_embedder: Callable[[], FaceEmbedder],
+        is_nobodys: Callable[[Subject], bool],
+        draw_other_person: Callable[[], DisplayImage],
     ) -> None:
         """Set up; the first frame of a subject opens its models.
 
@@ -93,6 +95,8 @@ class Pipeline:
             open_matte: called when a live person must first be parted from the room.
             make_anyone: makes the subject that stands for whoever comes while nobody is chosen, or somebody else.
             open_embedder: opens the network that tells people apart; it may be missing.
+            is_nobodys: whether a subject does not exist, so that anybody may move their portrait.
+            draw_other_person: draws the placeholder that is shown where somebody else may not, of that size.
         """
         self.timer = StageTimer()
         self.quality = FULL_QUALITY
@@ -109,6 +113,9 @@ class Pipeline:
         self._make_anyone = make_anyone
         self._identity = LiveIdentity(self._opened_embedder, landmark_scheme(tracker.scheme))
         self._open_embedder = open_embedder
+        self._is_nobodys, self._draw_other_person = is_nobodys, draw_other_person
+        self._not_them: Subject | None = None
+        self._placeholder: DisplayImage | None = None
         self._anyone: Subject | None = None
         self._troubles: dict[str, Degradation] = {}
         self._compositor = Compositor(size, self._opened_matte, self.timer, self._troubles)
@@ -167,8 +174,25 @@ class Pipeline:
         if tracked is None:  # the subject was chosen while this frame went untracked: no unlit picture under its scene
             tracked = self._track(frame, scene, quality)
         motion, others = tracked
-        mode = self._mode(self._lit_as(frame, motion, scene), scene.look.mode)
-        return mode.begin(frame, motion, scene, quality, others)
+        is_other = self._is_other_person(frame, motion, scene)
+        other_person = is_other and scene.subject is not None and not self._is_nobodys(scene.subject)
+        now = Situation(scene.look.mode, other_person=other_person, avatar_allowed=scene.avatar_allowed)
+        if what_is_shown(now) is Shown.PLACEHOLDER:
+            self._note_other_person("a placeholder is shown", scene, "or allow others to move this portrait")
+            if self._placeholder is None:
+                self._placeholder = self._draw_other_person()
+            hidden = RenderedFrame(self._placeholder, motion, scene, Shown.PLACEHOLDER, other_person=True)
+            return lambda: hidden
+        self._placeholder = None
+        subject = scene.subject
+        if is_other and scene.look.mode is Mode.LIVE:
+            self._note_other_person("you are lit as a mean head would be", scene, "or take one")
+            subject = None
+        else:
+            self._troubles.pop("identity", None)
+        mode = self._mode(subject or self._opened_anyone(), scene.look.mode)
+        render = mode.begin(frame, motion, scene, quality, others)
+        return lambda: replace(render(), other_person=other_person)
 
     def _track(self, frame: Frame, scene: Scene, quality: RenderQuality) -> tuple[FaceMotion, Mapping[int, FaceMotion]]:
         """The motion of the face that the camera is for, and in mode live that of the others by their numbers."""
@@ -192,25 +216,27 @@ class Pipeline:
         # The publisher shows it only where that is allowed.
         return RenderedFrame(image, None, scene, shown, unlit=True)
 
-    def _lit_as(self, frame: Frame, motion: FaceMotion, scene: Scene) -> Subject:
-        """As whom the live person is lit: as the subject, unless they are known to be somebody else."""
-        if scene.subject is None or scene.look.mode is not Mode.LIVE:
-            self._troubles.pop("identity", None)
-            return scene.subject or self._opened_anyone()
+    def _is_other_person(self, frame: Frame, motion: FaceMotion, scene: Scene) -> bool:
+        """Whether the live person is somebody else than the subject, as was known last: lost faces change nothing."""
+        if scene.subject is None:
+            return False
         plain = motion.status is FaceStatus.FOUND and motion.pose is not None and motion.pose.turn_deg <= PLAIN_TURN_DEG
         landmarks = None if motion.status is FaceStatus.LOST else motion.landmarks
         with self.timer.stage("identity"):
             verdict = self._identity.verdict(scene.subject, frame.image, landmarks, plain, frame.time_s)
-        if verdict is not Verdict.OTHER:
-            self._troubles.pop("identity", None)
-            return scene.subject
+        if verdict is Verdict.OTHER:
+            self._not_them = scene.subject
+        elif verdict is Verdict.SAME or self._not_them is not scene.subject:
+            self._not_them = None
+        return self._not_them is not None
+
+    def _note_other_person(self, shown: str, scene: Scene, cure: str) -> None:
         self._troubles["identity"] = Degradation(
-            "you are lit as a mean head would be",
+            shown,
             f"this is somebody else than {scene.subject_name or 'the subject'}",
-            "choose your own subject, or take one",
+            f"choose your own subject, {cure}",
             code=DegradationCode.OTHER_PERSON,
         )
-        return self._opened_anyone()
 
     def _opened_anyone(self) -> Subject:
         if self._anyone is None:

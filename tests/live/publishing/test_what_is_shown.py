@@ -19,7 +19,7 @@ KINDS = {
 
 def situations() -> Iterator[Situation]:
     either = (False, True)
-    for state in product(Mode, FacePresence, either, Rendering, either, either, either):
+    for state in product(Mode, FacePresence, either, either, either, Rendering, either, either, either):
         yield Situation(*state)
 
 
@@ -33,6 +33,19 @@ def test_as_filmed_is_shown_only_where_it_is_allowed() -> None:
     assert filmed
     assert all(now.filmed_allowed for now in filmed)
     assert not any(now.has_subject and now.rendering is not Rendering.HAS_FAILED for now in filmed)
+
+
+def test_somebody_elses_portrait_is_shown_only_where_that_is_allowed() -> None:
+    """Not even at rest, held, or exchanged for the picture as filmed; in mode live nobody wears another's face."""
+    for now in situations():
+        known = replace(now, other_person=True, avatar_allowed=False)
+        if now.mode is Mode.PORTRAIT and now.has_subject:
+            assert what_is_shown(known) is Shown.PLACEHOLDER
+        else:
+            assert what_is_shown(known) is what_is_shown(replace(known, other_person=False))
+        allowed = replace(now, other_person=True, avatar_allowed=True)
+        unknown = replace(now, other_person=False, avatar_allowed=False)
+        assert what_is_shown(allowed) is what_is_shown(unknown)
 
 
 def test_that_it_is_allowed_changes_nothing_while_pictures_come() -> None:

@@ -202,6 +202,22 @@ def test_settings_that_show_it_count_where_they_allow_it_too(folder: Path, caplo
     assert not run(allowed, given=None, instant=True).unlit_allowed
 
 
+def test_that_others_may_move_the_portrait_is_not_kept_and_counts_for_whoever_is_shown_first(folder: Path) -> None:
+    def change(controller: SceneController) -> None:
+        controller.choose_stored_subject("bea")
+        controller.set_avatar_allowed(True)
+
+    run(settings(folder), change)
+    again = run(settings(folder))
+    assert (again.subject_name, again.avatar_allowed) == ("bea", False)
+    first = run(settings(folder, output=OutputSettings(avatar_allowed=True)))
+    assert (first.subject_name, first.avatar_allowed) == ("bea", True)
+    allowed = settings(folder, subject="ada", output=OutputSettings(avatar_allowed=True))
+    for given in (NOTHING_GIVEN, GivenOptions(subject=True), None):
+        assert run(allowed, given=given).avatar_allowed
+    assert not run(allowed, given=None, instant=True).avatar_allowed
+
+
 # Writing
 
 

@@ -6,6 +6,7 @@ import io
 import shutil
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -26,7 +27,7 @@ from relit_camera.base.errors import InputError, NotFoundError, SubjectError
 from relit_camera.base.images.image_files import encode_display, write_linear
 from relit_camera.light.light_map import irradiance
 from relit_camera.live.scene.look_loader import BACKGROUND_ENVIRONMENT
-from relit_camera.live.scene.scene_controller import SceneController
+from relit_camera.live.scene.scene_controller import ChosenSubject, SceneController
 from relit_camera.subject.subject_file import write_subject
 from tests.generated_subject import small_subject
 
@@ -326,6 +327,46 @@ def test_what_needs_no_file_does_not_wait_for_one_that_is_read(
     assert scene.environment is not None
     assert (scene.environment.name, scene.look.lighting.environment) == ("window", "window")
     assert (scene.frozen, scene.unlit_allowed) == (True, False)
+
+
+@pytest.fixture
+def avatar(scene_controller: SceneController) -> SceneController:
+    """Shows ada, whose portrait others may move; bea is another person, `ada again` another file of the same."""
+    ada = small_subject()
+    bea = replace(ada, metadata=ada.metadata.model_copy(update={"created_at": "2027-01-01"}))
+    for name, subject in {"ada": ada, "ada again": ada, "bea": bea}.items():
+        write_subject(scene_controller.subjects.new_path(name), subject)
+    scene_controller.choose_stored_subject("ada")
+    scene_controller.set_avatar_allowed(True)
+    return scene_controller
+
+
+@pytest.mark.parametrize(("name", "stays"), [("ada", True), ("ada again", True), ("bea", False), (None, False)])
+def test_others_may_move_the_portrait_of_one_person(avatar: SceneController, name: str | None, stays: bool) -> None:
+    assert avatar.update_look(lambda look: look.model_copy(update={"mode": Mode.PORTRAIT})).avatar_allowed
+    assert avatar.choose_stored_subject(name).avatar_allowed is stays
+    assert avatar.choose_stored_subject("ada").avatar_allowed is stays
+    assert avatar.change(subject=ChosenSubject("bea"), avatar_allowed=True).avatar_allowed
+
+
+def test_the_portrait_of_a_renamed_person_may_still_be_moved(avatar: SceneController) -> None:
+    assert avatar.rename_stored_subject("ada", "lovelace").avatar_allowed
+
+
+def test_no_step_back_or_forward_lets_others_move_a_portrait(avatar: SceneController) -> None:
+    avatar.set_look(Look(lighting=Lighting(yaw_deg=5)))
+    avatar.set_avatar_allowed(False)
+    steps = (avatar.undo, avatar.undo, avatar.redo, avatar.redo, avatar.reset)
+    assert [step().avatar_allowed for step in steps] == [False] * 5
+    avatar.set_look(Look(lighting=Lighting(yaw_deg=10)))
+    avatar.set_avatar_allowed(True)
+    assert not avatar.undo().avatar_allowed, "a step back takes the permission back"
+
+
+def test_a_step_back_to_another_person_takes_the_permission_with_it(avatar: SceneController) -> None:
+    avatar.change(subject=ChosenSubject("bea"), avatar_allowed=True)
+    back = avatar.undo()
+    assert (back.subject_name, back.avatar_allowed) == ("ada", False)
 
 
 def test_a_file_that_fails_to_be_read_is_dropped_from_the_steps_once(

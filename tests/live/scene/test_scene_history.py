@@ -11,7 +11,7 @@ from tests.virtual_clock import VirtualClock
 
 
 def point(mode: Mode = Mode.PORTRAIT, subject: str | None = None, **lighting: float) -> ScenePoint:
-    return ScenePoint(Look(lighting=Lighting.model_validate(lighting), mode=mode), subject, False)
+    return ScenePoint(Look(lighting=Lighting.model_validate(lighting), mode=mode), subject, False, False)
 
 
 def steps(history: SceneHistory, now: ScenePoint) -> list[ScenePoint]:

@@ -23,6 +23,7 @@ from relit_camera.live.frame_recorder import FrameRecorder
 from relit_camera.live.pipeline import RenderedFrame
 from relit_camera.live.publishing.placeholder_image import Placeholder
 from relit_camera.live.publishing.publisher import PublishedPicture, Publisher
+from relit_camera.live.publishing.what_is_shown import Shown
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.status.camera_status import CameraState, DegradationCode
 from relit_camera.live.status.event_hub import Event, EventHub
@@ -85,6 +86,7 @@ class FakeSupervisor:
         self._shown: list[ShownPicture] = []
         self.fails = self.late = False
         self.face = FaceStatus.FOUND
+        self.kind = Shown.RELIT
 
     def handle_messages(self) -> list[ShownPicture]:
         if self.late:
@@ -97,7 +99,7 @@ class FakeSupervisor:
         camera.board.report(DegradationCode.PICTURE_FAILED, VideoError("x") if self.fails else None)
         if self.fails:
             return False
-        rendered = RenderedFrame(PICTURE, replace(MOTION, status=self.face), camera.scene)
+        rendered = RenderedFrame(PICTURE, replace(MOTION, status=self.face), camera.scene, self.kind)
         if publish_if_current(camera.publisher, lambda: camera.scene, frame, rendered):
             self._shown.append(ShownPicture(frame, rendered, camera.clock.now()))
         return True
@@ -116,7 +118,7 @@ class FakeFallback:
     def release(self, now: float) -> None:
         self.released += 1
 
-    def note_live(self, frame: Frame, motion: FaceMotion | None, scene: Scene) -> None:
+    def note_live(self, frame: Frame, rendered: RenderedFrame) -> None:
         self.live = frame.index
 
 
@@ -232,6 +234,28 @@ def test_a_late_unlit_picture_is_not_shown_once_that_is_forbidden(camera: LoopUn
     assert publish_if_current(camera.publisher, lambda: camera.scene, frame, rendered)
     assert camera.newest().unlit
     assert not publish_if_current(camera.publisher, lambda: forbidden, frame, rendered)
+
+
+def test_a_late_picture_of_a_portrait_that_others_move_is_not_shown_once_that_is_forbidden(
+    camera: LoopUnderTest,
+) -> None:
+    allowed = replace(camera.scene, avatar_allowed=True)
+    moved = RenderedFrame(PICTURE, None, allowed, other_person=True)
+    hidden = RenderedFrame(PICTURE, None, camera.scene, Shown.PLACEHOLDER, other_person=True)
+    frame = Frame(image(0), 0, camera.clock.now(), 0.0)
+    assert publish_if_current(camera.publisher, lambda: allowed, frame, moved)
+    assert not publish_if_current(camera.publisher, lambda: camera.scene, frame, moved)
+    assert publish_if_current(camera.publisher, lambda: camera.scene, frame, replace(moved, other_person=False))
+    assert publish_if_current(camera.publisher, lambda: camera.scene, frame, hidden)
+
+
+def test_the_state_says_where_a_placeholder_is_shown_in_place_of_a_portrait(camera: LoopUnderTest) -> None:
+    camera.supervisor.kind = Shown.PLACEHOLDER
+    camera.run(1.0)
+    assert camera.board.state is CameraState.OTHER_PERSON
+    camera.supervisor.kind = Shown.RELIT
+    camera.run(1.0)
+    assert camera.board.state is CameraState.LIVE
 
 
 def test_an_unlit_fallback_is_marked(camera: LoopUnderTest) -> None:

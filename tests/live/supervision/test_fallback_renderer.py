@@ -13,6 +13,8 @@ import pytest
 from relit_camera.base.config.look import Lamp, Lighting, Look, Mode
 from relit_camera.base.config.settings import Fallback
 from relit_camera.base.images.image_types import DisplayImage, Frame
+from relit_camera.face.motion.face_follower import FaceMotion
+from relit_camera.live.modes.mode import RenderedFrame
 from relit_camera.live.publishing.placeholder_image import Placeholder
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.supervision import fallback_renderer
@@ -51,6 +53,11 @@ def renderer(
     return FallbackRenderer(LIVE_SIZE, instead, Placeholder(lambda: FAILED), start)
 
 
+def made(scene: Scene, motion: FaceMotion | None = None, other_person: bool = False) -> RenderedFrame:
+    """A picture that the pipeline has made."""
+    return RenderedFrame(np.zeros((*LIVE_SIZE[::-1], 3), np.uint8), motion, scene, other_person=other_person)
+
+
 def lit_from(azimuth_deg: float) -> Scene:
     lighting = Lighting(environment=None, lamps=[Lamp(azimuth_deg=azimuth_deg)], transition_s=0)
     return Scene(Look(lighting=lighting, mode=Mode.PORTRAIT), subject=person())
@@ -79,7 +86,7 @@ def test_it_moves_aside_as_the_head_did_when_it_was_last_tracked_and_does_since(
     fallback, scene = renderer(), lit_from(0)
     live = live_frame()
     at_rest = middle(shown(fallback, live, scene))
-    fallback.note_live(live, motion(shift=(4, 0, 0)), scene)
+    fallback.note_live(live, made(scene, motion(shift=(4, 0, 0))))
     aside = middle(shown(fallback, live, scene))
     assert aside > at_rest + 5
     moved = Frame(np.roll(live.image, 6, axis=1), 1, live.captured_at + 0.03, live.time_s + 0.03)
@@ -144,20 +151,36 @@ def test_a_live_picture_is_held_and_nothing_of_the_source_image_appears(
 
     fallback = renderer(never, instead)
     scene = Scene(Look(mode=Mode.LIVE), subject=person(), unlit_allowed=allowed)
-    fallback.note_live(at(0.0), None, scene)
+    fallback.note_live(at(0.0), made(scene))
     assert fallback.picture(at(2.0), scene) is None
     assert fallback.picture(at(2.0 + HOLD_S - 0.1), scene) is None
     picture = fallback.picture(at(2.0 + HOLD_S), scene)
     assert picture is not None
     assert picture.unlit is filmed
     np.testing.assert_array_equal(picture.image, live_frame().image if filmed else FAILED)
-    fallback.note_live(at(20.0), None, scene)
+    fallback.note_live(at(20.0), made(scene))
     assert fallback.picture(at(21.0), scene) is None, "it begins anew after a picture"
+
+
+@pytest.mark.parametrize("mode", list(Mode))
+def test_somebody_who_was_known_to_be_another_moves_no_portrait(mode: Mode) -> None:
+    """The source image would follow their head: whatever mode the last picture was of, unless it is allowed by now."""
+    fallback, scene = renderer(), lit_from(0)
+    last = replace(scene, look=scene.look.model_copy(update={"mode": mode}))
+    fallback.note_live(at(0.0), made(last, motion(shift=(4, 0, 0)), other_person=True))
+    np.testing.assert_array_equal(shown(fallback, at(0.1), scene), FAILED)
+    assert (shown(fallback, at(0.2), replace(scene, avatar_allowed=True)) != FAILED).any()
+    another = replace(scene, subject=replace(person()))
+    assert (shown(fallback, at(0.3), another) != FAILED).any(), "nothing is known of another subject"
+    fallback.forget()
+    np.testing.assert_array_equal(shown(fallback, at(0.4), scene), FAILED)
+    fallback.note_live(at(0.5), made(scene))
+    assert (shown(fallback, at(0.6), scene) != FAILED).any()
 
 
 def test_nothing_of_another_mode_is_held() -> None:
     """Who turns to portrait while pictures fail is hidden at once."""
     live = Scene(Look(mode=Mode.LIVE), subject=person())
     fallback = renderer(Opener())
-    fallback.note_live(at(0.0), None, live)
+    fallback.note_live(at(0.0), made(live))
     np.testing.assert_array_equal(shown(fallback, at(0.1), lit_from(0)), FAILED)

@@ -156,6 +156,8 @@ class SceneBody(ApiModel):
     """How the subject was captured; null for nobody, and where its file does not say."""
     unlit_allowed: bool
     """Whether the picture as filmed may be published: without a subject or a face, and before and after."""
+    avatar_allowed: bool
+    """Whether others than the subject may move the portrait, in mode portrait."""
     frozen: bool
     can_undo: bool
     can_redo: bool
@@ -174,6 +176,9 @@ class SceneChanges(ApiModel):
     frozen: bool = False
     unlit_allowed: bool = False
     """Whether the picture as filmed may be published: a person must have confirmed that. Not kept over a restart."""
+    avatar_allowed: bool = False
+    """Whether others than the subject may move the portrait: a person must have confirmed that. It is withdrawn where
+    another subject is chosen, and not kept over a restart."""
 
 
 class Health(ApiModel):

@@ -4,6 +4,7 @@ import "./light/ball.js";
 import "./light/sliders.js";
 import "./light/look_tiles.js";
 import "./library/places.js";
+import "./library/avatar.js";
 import "./library/faces.js";
 import "./library/presets.js";
 import "./camera/devices.js";

@@ -73,6 +73,7 @@ def scene_body(scene: Scene) -> SceneBody:
         subject=scene.subject_name,
         rung=scene.subject.metadata.rung if scene.subject else None,
         unlit_allowed=scene.unlit_allowed,
+        avatar_allowed=scene.avatar_allowed,
         frozen=scene.frozen,
         can_undo=scene.can_undo,
         can_redo=scene.can_redo,

@@ -42,6 +42,7 @@ def change_scene(api: ApiContextDep, response: Response, changes: SceneChanges, 
         subject=ChosenSubject(changes.subject) if "subject" in given else None,
         frozen=changes.frozen if "frozen" in given else None,
         unlit_allowed=changes.unlit_allowed if "unlit_allowed" in given else None,
+        avatar_allowed=changes.avatar_allowed if "avatar_allowed" in given else None,
         if_revision=None if if_match is None else matching_revisions(if_match),
     )
     return _answer(scene, response)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import logging
+from functools import lru_cache
 from pathlib import Path
 
 from relit_camera.app.setup.needed_models import missing_models
 from relit_camera.base.errors import StorageError
 from relit_camera.base.storage.atomic_files import make_folder
+from relit_camera.subject.subject import SubjectMetadata
 from relit_camera.subject.subject_file import copy_subject, read_metadata
 
 log = logging.getLogger(__name__)
@@ -41,6 +43,16 @@ def noted_subject(folder: Path) -> Path:
         log.warning("the panel does not know how the bundled person was captured: %s", error)
         return SUBJECT
     return copy
+
+
+def is_demo_person(metadata: SubjectMetadata) -> bool:
+    """Whether a subject with this header is the bundled person, under whatever name it is stored."""
+    return metadata.model_copy(update=SUBJECT_NOTES) == _noted_header()
+
+
+@lru_cache(maxsize=1)
+def _noted_header() -> SubjectMetadata:
+    return read_metadata(SUBJECT).model_copy(update=SUBJECT_NOTES)
 
 
 def tracker_of_clip() -> str:

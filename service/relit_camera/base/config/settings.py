@@ -68,6 +68,9 @@ class OutputSettings(SettingsModel):
     unlit_allowed: bool = False
     """Whether the picture as filmed may be published: without a subject, while pictures fail, before and after
     (`split`). The panel can allow it for one run."""
+    avatar_allowed: bool = False
+    """Whether others than the subject may move the portrait (mode portrait): an actor and an avatar. The panel can
+    allow it for one subject."""
 
     @field_validator("sink", mode="before")
     @classmethod

@@ -32,6 +32,9 @@ def replay(
     instant: Annotated[bool, typer.Option("--instant", help="Capture the subject from the video itself.")] = False,
     report: Annotated[Path | None, typer.Option(help="JSON to write: state, pose and times of each frame.")] = None,
     mode: Annotated[str, typer.Option(help="live or portrait.")] = "live",
+    avatar: Annotated[
+        bool, typer.Option("--avatar", help="Allow others than the subject to move the portrait (mode portrait).")
+    ] = False,
     tracker: Annotated[str | None, typer.Option(help="mesh, openseeface, or recorded:TRACK.json.")] = None,
     background: Annotated[str, typer.Option(help="none, blur, environment, or #RRGGBB.")] = "none",
     rotate: Annotated[str, typer.Option(help="YAW,PITCH,ROLL of the environment, in degrees.")] = "0,0,0",
@@ -68,7 +71,7 @@ def replay(
         raise typer.BadParameter("give --subject or --instant, not both", param_hint="--subject")
     if video.resolve() == out.resolve():
         raise typer.BadParameter(f"{out} is the driving video itself", param_hint="--out")
-    settings = load_command_settings(context, tracker={"name": tracker})
+    settings = load_command_settings(context, output={"avatar_allowed": avatar or None}, tracker={"name": tracker})
     offer_models(settings.tracker.name, settings.matte, pull, settings.pull_models)
     limit_threads()
     chosen_background, chosen_mode = parse_background(background), parse_mode(mode)
@@ -82,6 +85,7 @@ def replay(
         raise typer.BadParameter("portrait needs --subject, or --instant", param_hint="--mode")
     else:
         scene_controller.load_configured_subject(ANYONE)
+    scene_controller.set_avatar_allowed(settings.output.avatar_allowed)
     lighting = parse_lighting(scene_controller.register_temporary_environment(environment), rotate, exposure_ev)
     scene_controller.set_look(Look(lighting=lighting, background=chosen_background, mode=chosen_mode))
     track = make_tracker(settings)
@@ -129,7 +133,7 @@ def replay(
 
 
 def _otherwise_shown(frames: Sequence[ReplayedFrame]) -> str:
-    """What was shown in the frames without a face that tells its light: a clause each."""
+    """What was shown in the frames that are not as asked: a clause each."""
     from collections import Counter
 
     from relit_camera.live.publishing.what_is_shown import Shown
@@ -138,6 +142,7 @@ def _otherwise_shown(frames: Sequence[ReplayedFrame]) -> str:
         Shown.LAST_LIGHT: "the person in their mean light",
         Shown.PLACE_TINT: "the person in the tint of the place",
         Shown.AT_REST: "the subject at rest",
+        Shown.PLACEHOLDER: "a placeholder, for somebody else than the subject,",
     }
     counts = Counter(frame.shown for frame in frames)
     return "".join(f"; {what} in {counts[kind]}" for kind, what in words.items() if counts[kind])

@@ -23,6 +23,9 @@ def run(
     unlit: Annotated[
         bool, typer.Option("--unlit", help="Allow the picture as filmed, where there is no subject or no face.")
     ] = False,
+    avatar: Annotated[
+        bool, typer.Option("--avatar", help="Allow others than the subject to move the portrait (mode portrait).")
+    ] = False,
     environment: Annotated[str | None, typer.Option(help="A stored environment's name, or a panorama file.")] = None,
     mode: Annotated[
         str | None,
@@ -54,7 +57,13 @@ def run(
     width, height = parse_size(size) if size else (None, None)
     given = {
         "source": {"source": source, "on_demand": on_demand},
-        "output": {"sink": sink, "width": width, "height": height, "unlit_allowed": unlit or None},
+        "output": {
+            "sink": sink,
+            "width": width,
+            "height": height,
+            "unlit_allowed": unlit or None,
+            "avatar_allowed": avatar or None,
+        },
         "subject": subject,
         "look": {"mode": str(parse_mode(mode)) if mode else None},
         "tracker": {"name": tracker},

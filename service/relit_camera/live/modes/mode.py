@@ -28,6 +28,7 @@ class RenderedFrame:
         scene: that it was made for.
         shown: the kind of picture.
         unlit: whether the person is as filmed, in a part of it or in all.
+        other_person: whether the live person is known to be somebody else than the subject, who is somebody.
     """
 
     image: DisplayImage
@@ -35,6 +36,7 @@ class RenderedFrame:
     scene: Scene
     shown: Shown = Shown.RELIT
     unlit: bool = False
+    other_person: bool = False
 
 
 RenderTask = Callable[[], RenderedFrame]

@@ -54,6 +54,8 @@ class Situation:
         mode: that was chosen.
         face: of the live person.
         has_subject: whether somebody is chosen, or whoever comes.
+        other_person: whether the live person is known to be somebody else than the subject, who is somebody.
+        avatar_allowed: others may move the subject's portrait.
         rendering: whether the pipeline gives pictures.
         can_rest: whether the source image can be relit now without the pipeline.
         filmed_allowed: the picture as filmed may be published.
@@ -63,6 +65,8 @@ class Situation:
     mode: Mode
     face: FacePresence = FacePresence.FOLLOWED
     has_subject: bool = True
+    other_person: bool = False
+    avatar_allowed: bool = False
     rendering: Rendering = Rendering.WORKS
     can_rest: bool = False
     filmed_allowed: bool = False
@@ -72,10 +76,12 @@ class Situation:
 def what_is_shown(now: Situation) -> Shown:
     """The kind of picture that is shown: of the mode that was chosen, never of the other one.
 
-    A person is shown as filmed only where that is allowed.
+    Only where that is allowed is a person shown as filmed, or a portrait moved by somebody else.
     """
     if not now.has_subject:
         return Shown.FILMED if now.filmed_allowed else Shown.PLACEHOLDER
+    if now.mode is Mode.PORTRAIT and now.other_person and not now.avatar_allowed:
+        return Shown.PLACEHOLDER
     if now.rendering is Rendering.WORKS:
         if now.face is FacePresence.FOLLOWED:
             return Shown.RELIT

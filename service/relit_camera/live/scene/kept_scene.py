@@ -108,6 +108,7 @@ def show_first_scene(
             _in_environment(look.model_copy(update={"background": EnvironmentBackground()}), None)
         )
     scene_controller.load_configured_subject(None if instant else settings.subject)
+    scene_controller.set_avatar_allowed(settings.output.avatar_allowed and not instant)
     scene_controller.mark_start()
     if given is not None:
         _show_kept(scene_controller, settings, environment, instant, given)
@@ -158,10 +159,13 @@ def _show_kept(
 
 def _show_or_say(scene_controller: SceneController, look: Look | None, subject: ChosenSubject | None) -> bool:
     """Show it, all of it relit unless it may be as filmed. Returns whether it could be; the log says why not."""
-    if look is not None and not scene_controller.scene.unlit_allowed:
+    scene = scene_controller.scene
+    if look is not None and not scene.unlit_allowed:
         look = look.relit()
+    change = None if look is None else lambda _: look
     try:
-        scene_controller.change(None if look is None else lambda _: look, subject, recorded=False)
+        # What the settings allow counts for whoever is shown first.
+        scene_controller.change(change, subject, avatar_allowed=scene.avatar_allowed, recorded=False)
     except RelitError as error:
         log.warning("what was kept is not all shown: %s", error)
         return False

@@ -23,6 +23,7 @@ class Scene:
         frozen: whether the published picture is held.
         unlit_allowed: whether the picture as filmed may be published: where there is no subject, no face, before and
             after. Else what `what_is_shown` says is.
+        avatar_allowed: whether others may move this subject's portrait (mode portrait).
         revision: number of changes so far.
         mode_revision: the revision with which the look's mode was last changed.
         can_undo, can_redo: whether there is a change to undo, or to do again.
@@ -35,6 +36,7 @@ class Scene:
     subject: Subject | None = None
     frozen: bool = False
     unlit_allowed: bool = False
+    avatar_allowed: bool = False
     revision: int = 0
     mode_revision: int = 0
     can_undo: bool = False

@@ -73,18 +73,21 @@ class SceneController:
         subject: ChosenSubject | None = None,
         frozen: bool | None = None,
         unlit_allowed: bool | None = None,
+        avatar_allowed: bool | None = None,
         if_revision: Collection[int] | None = None,
         recorded: bool = True,
     ) -> Scene:
         """Change the scene, all of it in one step or nothing. What is None stays.
 
-        Where `unlit_allowed` becomes false, nothing of the look stays that shows the picture as filmed.
+        Where `unlit_allowed` becomes false, nothing of the look stays that shows the picture as filmed. That others may
+        move the portrait is said of one person: where another one is chosen, it is said no more.
 
         Args:
             look: makes the next look of the present one; it is called again where files had to be read first.
             subject: who is shown.
             frozen: whether the published picture is held.
             unlit_allowed: whether the picture as filmed may be published.
+            avatar_allowed: whether others may move the subject's portrait.
             if_revision: revisions for which the change is meant; any if not given.
             recorded: whether the change can be undone.
 
@@ -113,8 +116,12 @@ class SceneController:
                     f"{LEAST_RELIT_BLEND} or more",
                 )
             changes = {} if wanted is now.look else self._with_look(wanted, loaded)
+            avatar = now.avatar_allowed
             if subject is not None:
-                changes |= {"subject_name": subject.name, "subject": self._subject(subject, loaded)}
+                person = self._subject(subject, loaded)
+                changes |= {"subject_name": subject.name, "subject": person}
+                avatar = avatar and _is_same_person(person, now.subject)
+            changes["avatar_allowed"] = avatar if avatar_allowed is None else avatar_allowed
             if frozen is not None:
                 changes["frozen"] = frozen
             return self._show(self._next(unlit_allowed=allowed, **changes), recorded)
@@ -225,6 +232,10 @@ class SceneController:
         """Say whether the picture as filmed may be published."""
         return self.change(unlit_allowed=allowed)
 
+    def set_avatar_allowed(self, allowed: bool) -> Scene:
+        """Say whether others may move the subject's portrait."""
+        return self.change(avatar_allowed=allowed)
+
     def mark_start(self) -> None:
         """Make the present scene the one that `reset` brings back, and forget the steps before it."""
         with self._change:
@@ -233,7 +244,7 @@ class SceneController:
             self.scene = replace(self.scene, can_undo=False, can_redo=False)
 
     def undo(self) -> Scene:
-        """Take the last step back. What may be published as filmed is never more after it.
+        """Take the last step back. No more is allowed after it than before.
 
         Raises:
             ConflictError: there is nothing to undo.
@@ -242,7 +253,7 @@ class SceneController:
         return self._step(self._history.undo, ConflictError("there is nothing to undo", "change something first"))
 
     def redo(self) -> Scene:
-        """Do the step again that was undone last. What may be published as filmed is never more after it.
+        """Do the step again that was undone last. No more is allowed after it than before.
 
         Raises:
             ConflictError: there is nothing to do again.
@@ -253,7 +264,7 @@ class SceneController:
     def reset(self) -> Scene:
         """Show what the settings say, as at the first start; it can be undone.
 
-        Where they name no subject, whoever is shown stays. What may be published as filmed is never more after it.
+        Where they name no subject, whoever is shown stays. No more is allowed after it than before.
 
         Raises:
             RelitError: what the settings name is not stored any more.
@@ -283,14 +294,15 @@ class SceneController:
         return load_and_change(self._change, made)
 
     def _restored(self, point: ScenePoint, loaded: Loaded) -> Scene:
-        """The next scene, with what `point` says of it; what may be published as filmed is never more."""
+        """The next scene, with what `point` says of it; no more is allowed than before."""
         now = self.scene
+        avatar = now.avatar_allowed and point.avatar_allowed and point.subject_name == now.subject_name
         allowed = now.unlit_allowed and point.unlit_allowed
         changes = self._with_look(point.look if allowed else point.look.relit(), loaded)
         if point.subject_name != now.subject_name:
             subject = self._subject(ChosenSubject(point.subject_name), loaded)
             changes |= {"subject_name": point.subject_name, "subject": subject}
-        return self._next(unlit_allowed=allowed, **changes)
+        return self._next(unlit_allowed=allowed, avatar_allowed=avatar, **changes)
 
     def _subject(self, chosen: ChosenSubject, loaded: Loaded) -> Subject | None:
         """Who is chosen; breaks off where their file must be read first (`Loaded.ask_for`).
@@ -358,4 +370,9 @@ class SceneController:
 
 
 def _point(scene: Scene) -> ScenePoint:
-    return ScenePoint(scene.look, scene.subject_name, scene.unlit_allowed)
+    return ScenePoint(scene.look, scene.subject_name, scene.unlit_allowed, scene.avatar_allowed)
+
+
+def _is_same_person(subject: Subject | None, other: Subject | None) -> bool:
+    """Whether both are of one capture: its file may have been renamed, or given other stills."""
+    return subject is not None and other is not None and subject.metadata == other.metadata

@@ -27,11 +27,13 @@ class ScenePoint:
         look: lighting, background and mode.
         subject_name: who is shown; None for nobody.
         unlit_allowed: whether the picture as filmed may be published.
+        avatar_allowed: whether others may move the subject's portrait.
     """
 
     look: Look
     subject_name: str | None
     unlit_allowed: bool
+    avatar_allowed: bool
 
     def with_renamed(self, name: str, new_name: str) -> ScenePoint:
         """The same, where subject `name` is called `new_name` now."""
@@ -144,4 +146,5 @@ def _values(point: ScenePoint) -> dict[str, object]:
         "mode": look.mode,
         "subject": point.subject_name,
         "unlit_allowed": point.unlit_allowed,
+        "avatar_allowed": point.avatar_allowed,
     }

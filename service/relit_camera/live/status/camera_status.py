@@ -29,6 +29,8 @@ class CameraState(StrEnum):
     """A first subject is being captured, and nothing may be shown unlit: the placeholder says so."""
     NO_SUBJECT = "no-subject"
     """Nobody is chosen, and nothing may be shown unlit: the placeholder says so."""
+    OTHER_PERSON = "other-person"
+    """Somebody else than the subject is before the camera, and may not move the portrait: the placeholder says so."""
     FROZEN = "frozen"
     STOPPING = "stopping"
 
@@ -53,7 +55,8 @@ class DegradationCode(StrEnum):
     NO_SUBJECT = "no-subject"
     """No subject is chosen: a placeholder is shown, or the picture as filmed where that is allowed."""
     OTHER_PERSON = "other-person"
-    """Mode live: somebody else than the subject is before the camera, and lit as anybody would be."""
+    """Somebody else than the subject is before the camera: in mode live lit as anybody would be, in mode portrait not
+    shown."""
     ROOM_NOT_PARTED = "room-not-parted"
     """The matting model is not stored: a room that is kept is lit as the person is."""
     PROVIDER_FALLBACK = "provider-fallback"

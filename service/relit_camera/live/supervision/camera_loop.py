@@ -16,6 +16,7 @@ from relit_camera.live.frame_recorder import FrameRecorder
 from relit_camera.live.pipeline import RenderedFrame
 from relit_camera.live.publishing.placeholder_image import Placeholder
 from relit_camera.live.publishing.publisher import PublishedPicture, Publisher
+from relit_camera.live.publishing.what_is_shown import Shown
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.status.camera_status import CameraState, DegradationCode
 from relit_camera.live.status.stage_timing import RateMeter
@@ -175,13 +176,14 @@ class CameraLoop:
     def _note_shown(self, shown: ShownPicture) -> None:
         self.pipeline_rate.tick(shown.at)
         motion = shown.rendered.motion
-        self._fallback.note_live(shown.frame, motion, shown.rendered.scene)
+        self._fallback.note_live(shown.frame, shown.rendered)
         face = motion.status if motion else FaceStatus.LOST
         self._board.set_face(face)
         # A picture of a frame before the one that failed is no recovery: fallbacks follow.
         if not self._failing() and shown.frame.index > self._publisher.superseded_index:
             tracked = motion is None or face is not FaceStatus.LOST
-            self._board.set_state(CameraState.LIVE if tracked else CameraState.SEARCHING)
+            state = CameraState.LIVE if tracked else CameraState.SEARCHING
+            self._board.set_state(CameraState.OTHER_PERSON if shown.rendered.shown is Shown.PLACEHOLDER else state)
 
 
 def publish_if_current(publisher: Publisher, scene: Callable[[], Scene], frame: Frame, rendered: RenderedFrame) -> bool:
@@ -194,6 +196,8 @@ def publish_if_current(publisher: Publisher, scene: Callable[[], Scene], frame: 
     if now.frozen or now.subject is not then.subject or now.look.mode is not then.look.mode:
         return False
     if rendered.unlit and not now.unlit_allowed:
+        return False
+    if rendered.other_person and then.avatar_allowed and not now.avatar_allowed:
         return False
     publisher.pictures.put(PublishedPicture(rendered.image, frame.captured_at, frame.index, rendered.unlit))
     return True

@@ -22,6 +22,7 @@ from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.light.light_map import LightMap
 from relit_camera.live.compositing.background_renderer import BackgroundRenderer
 from relit_camera.live.compositing.compositor import composite_source_image
+from relit_camera.live.modes.mode import RenderedFrame
 from relit_camera.live.publishing.placeholder_image import Placeholder
 from relit_camera.live.publishing.what_is_shown import Rendering, Shown, Situation, what_is_shown
 from relit_camera.live.reenactment.motion_transfer import split_body_motion
@@ -98,14 +99,15 @@ class FallbackRenderer:
         self._opening: tuple[Subject, Future[_RelitSource]] | None = None
         self._failing_since: float | None = None
         self._last_scene: Scene | None = None
+        self._other_person = False
         self._used_at = 0.0
         self._failed_subject: Subject | None = None
 
-    def note_live(self, frame: Frame, motion: FaceMotion | None, scene: Scene) -> None:
-        """A picture of this frame was shown for a scene, in which the face moved so: a fallback goes on from there."""
-        self._last_scene = scene
+    def note_live(self, frame: Frame, rendered: RenderedFrame) -> None:
+        """The picture of this frame was shown: a fallback goes on from there."""
+        self._last_scene, self._other_person = rendered.scene, rendered.other_person
         self._failing_since = None
-        self._head.begin_at(frame, motion)
+        self._head.begin_at(frame, rendered.motion)
 
     def forget(self) -> None:
         """Nobody is shown: keep neither a frame nor the relit source image nor the background."""
@@ -125,9 +127,12 @@ class FallbackRenderer:
         if self._failing_since is None:
             self._failing_since = now
         rest = self._at_rest(frame, scene) if scene.look.mode is Mode.PORTRAIT else None
+        last = self._last_scene
         situation = Situation(
             scene.look.mode,
             has_subject=not scene.shows_nobody,
+            other_person=self._other_person and last is not None and last.subject is scene.subject,
+            avatar_allowed=scene.avatar_allowed,
             rendering=Rendering.FAILS if self._may_hold(now, scene) else Rendering.HAS_FAILED,
             can_rest=rest is not None,
             filmed_allowed=scene.unlit_allowed,

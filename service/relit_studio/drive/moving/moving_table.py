@@ -91,7 +91,7 @@ def evaluate_mode(
     """
     settings = RelitSettings(tracker=TrackerSettings(name=tracker))
     lighting = Lighting(environment=light.name)
-    scene = Scene(Look(lighting=lighting, mode=mode), light, subject=subject, unlit_allowed=True)
+    scene = Scene(Look(lighting=lighting, mode=mode), light, subject=subject, unlit_allowed=True, avatar_allowed=True)
     follower = make_tracker(settings)
     figures, shown = PartAccuracy(), []
 

@@ -13,13 +13,14 @@ const STATES = {
   released: "Webcam released until somebody looks",
   capturing: "Nobody is shown yet",
   "no-subject": "Nobody is shown yet",
+  "other-person": "Somebody else’s portrait is not shown",
   frozen: "Frozen",
   stopping: "Stopping…",
   lost: "Not connected",
 };
 const VEILED = ["waiting", "lost", "starting", "capturing"];
 /** Where a placeholder is shown, a rate of pictures would only worry. */
-const STILL = ["waiting", "released", "starting", "capturing", "no-subject"];
+const STILL = ["waiting", "released", "starting", "capturing", "no-subject", "other-person"];
 const LOST_TEXT = "The camera does not answer. Start it again: relit run. This page finds it by itself.";
 const UNLIT_TEXT = "Others see your webcam’s picture as it is.";
 
