@@ -50,7 +50,7 @@ def replay(
     from relit_camera.app.replay.video_replay import replay as run_replay
     from relit_camera.app.wiring import make_pipeline, make_tracker
     from relit_camera.base.concurrency.threads import limit_threads
-    from relit_camera.base.config.look import Look, Mode
+    from relit_camera.base.config.look import ANYONE, Look, Mode
     from relit_camera.base.images.contact_sheet import contact_sheet as draw_sheet
     from relit_camera.base.images.image_files import encode_display
     from relit_camera.base.images.image_types import DisplayImage
@@ -60,7 +60,6 @@ def replay(
     from relit_camera.cli.model_offer import offer_models
     from relit_camera.cli.progress import progress_bar
     from relit_camera.live.scene.scene_controller import SceneController
-    from relit_camera.subject.subject import ANYONE
 
     if contact_sheet and contact_sheet.suffix.lower() not in (".png", ".jpg", ".jpeg"):
         raise typer.BadParameter(f"{contact_sheet} is neither .png nor .jpg", param_hint="--contact-sheet")
