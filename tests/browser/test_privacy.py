@@ -57,10 +57,11 @@ def warning_color(panel: Panel) -> tuple[int, int, int]:
 
 
 def test_nothing_raw_is_published_without_a_confirmed_choice(tmp_path: Path, open_page: OpenPage) -> None:
-    """Nobody captured, the choice offered, refused, made, taken back, made again, and the camera started anew."""
+    """Hidden, the choice offered, refused, made, taken back, made again, and the camera started anew."""
     with camera_on_clip(tmp_path) as camera:
         panel = open_panel(open_page, camera.url)
         dialog = panel.page.locator("#unlit-dialog")
+        panel.page.locator("#hide").click()
         expect(panel.doors).to_be_visible()
         assert never_raw(camera)
         panel.page.locator("#door-unlit").click()

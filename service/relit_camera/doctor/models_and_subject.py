@@ -76,7 +76,7 @@ def check_subject(settings: RelitSettings) -> Finding:
     topic, store = "subject", SubjectStore(settings.storage.subjects, copied=True)  # as the camera does
     stored = ", ".join(store.names())
     if settings.named_subject is None:
-        shown = "a placeholder is shown" if settings.subject is None else "you are lit as a mean head would be"
+        shown = "a placeholder is shown" if settings.subject is None else "you are lit as an average head would be"
         cure = f"choose one by `subject:` in config.yaml or --subject; stored are: {stored}"
         if not stored:
             cure = "make one: relit capture build FILM --out me.relit; or see `relit demo`"

@@ -205,7 +205,7 @@ class Pipeline:
             self._troubles.pop("identity", None)
             return scene.subject
         self._troubles["identity"] = Degradation(
-            "you are lit as a mean head would be",
+            "you are lit as an average head would be",
             f"this is somebody else than {scene.subject_name or 'the subject'}",
             "choose your own subject, or take one",
             code=DegradationCode.OTHER_PERSON,

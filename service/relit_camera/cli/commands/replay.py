@@ -41,7 +41,7 @@ def replay(
 ) -> None:
     """Relight a recorded video.
 
-    Without a subject, whoever is in it is lit as a mean head of their skin would be; with one, the better for it.
+    Without a subject, whoever is in it is lit as an average head of their skin would be; with one, the better for it.
     """
     import json
     import sys
@@ -161,7 +161,7 @@ def _instant_subject(video: Path, settings: RelitSettings, not_without: bool) ->
     except CaptureError as error:
         if not_without:
             raise
-        typer.echo(f"warning: {error}; whoever is in it is lit as a mean head would be", err=True)
+        typer.echo(f"warning: {error}; whoever is in it is lit as an average head would be", err=True)
         return None
     for warning in captured.warnings:
         typer.echo(f"warning: {warning}", err=True)

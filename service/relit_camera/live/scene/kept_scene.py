@@ -116,7 +116,7 @@ def show_first_scene(
         _show_kept(scene_controller, settings, environment, instant, given)
     scene = scene_controller.scene
     if scene.subject_name == ANYONE and not scene.shows_nobody:
-        log.info("whoever comes is lit as a mean head would be; for nobody: Nobody in the panel, or 'subject: null'")
+        log.info("whoever comes is relit; to hide them choose Nobody in the panel, or write 'subject: null'")
 
 
 def _show_kept(
