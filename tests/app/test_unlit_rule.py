@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from relit_camera.app import wiring
+from relit_camera.app.camera_service import NO_SUBJECT_MESSAGE
 from relit_camera.base.config.look import ANYONE, Lighting, Look, Mode
 from relit_camera.base.config.settings import Fallback
 from relit_camera.base.errors import ModelError
@@ -86,6 +87,9 @@ def test_no_subject(tmp_path: Path, mode: Mode) -> None:
     with running_camera(tmp_path, memory_source(FILMED), look=LIVE.model_copy(update={"mode": mode})) as camera:
         camera.put("subject", name=None)
         wait_until(lambda: camera.status()["state"] == "no-subject")
+        count = camera.sink.count
+        wait_until(lambda: camera.sink.count >= count + 2)
+        assert difference(camera.sink.new[-1], placeholder(SIZE, NO_SUBJECT_MESSAGE)) == 0  # and not the last picture
         check_nothing_as_filmed(camera)
         assert DegradationCode.NO_SUBJECT in camera.degraded()
 

@@ -32,7 +32,7 @@ from tests.browser.browser_pages import OpenPage
 from tests.browser.cameras import START_S, Api, FakeServer, camera_process, fake_server
 from tests.browser.conftest import Timed
 from tests.browser.panel import Panel, open_panel
-from tests.browser.test_privacy import never_raw
+from tests.browser.test_privacy import FACE, is_raw
 from tests.devices.test_webcam_controls import FakeWebcam
 from tests.small_camera import wait_until
 
@@ -100,7 +100,7 @@ def test_whoever_comes_is_relit_at_once_and_makes_that_their_subject(
         with timed("open the page, be relit"):
             panel = open_panel(open_page, camera.url)
             camera.wait_for("status", state="live", subject="anyone", unlit=False)
-            assert never_raw(camera)
+            assert not is_raw(camera, FACE)
         page, dialog = panel.page, panel.page.locator("#face-dialog")
         expect(panel.doors).to_be_hidden()
         expect(panel.face("Anyone")).to_have_attribute("aria-pressed", "true")

@@ -23,6 +23,8 @@ RAW_BELOW = 14.0
 """Mean difference from a frame of the clip, code values: JPEG and scaling make less, another light makes more."""
 WATCHED_S = 2.0
 SMALL = (160, 90)
+WHOLE, FACE = np.s_[:, :], np.s_[25:65, 60:100]
+"""Parts of a small picture."""
 
 
 @cache
@@ -36,10 +38,10 @@ def filmed() -> tuple[DisplayImage, ...]:
         )
 
 
-def is_raw(camera: Api) -> bool:
-    """Whether the published picture is one that the webcam took."""
+def is_raw(camera: Api, part: tuple[slice, slice] = WHOLE) -> bool:
+    """Whether the published picture, or a part of it, is one that the webcam took."""
     shown = cv2.resize(camera.published(), SMALL, interpolation=cv2.INTER_AREA).astype(np.float32)
-    return min(float(np.abs(shown - frame).mean()) for frame in filmed()) < RAW_BELOW
+    return min(float(np.abs(shown - frame)[part].mean()) for frame in filmed()) < RAW_BELOW
 
 
 def never_raw(camera: Api) -> bool:

@@ -14,7 +14,7 @@ const byId = (id) => document.getElementById(id);
 
 // Before all else, and without the controls: nobody is to be shown for longer than they want
 byId("unlit-stop").onclick = hideUnlit;
-byId("hide").onclick = () => change({ subject: null, unlit_allowed: false });
+byId("hide").onclick = () => change({ subject: null, unlit_allowed: false, frozen: false });
 onScene((now) => { byId("hide").hidden = showsNobody(now); });
 keepFocus();
 

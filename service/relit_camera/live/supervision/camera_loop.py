@@ -116,9 +116,9 @@ class CameraLoop:
             self._fallback.forget()
         if scene.shows_nobody and not scene.unlit_allowed:
             if self._is_capturing():
-                self._show(self._placeholders.capturing, CameraState.CAPTURING)
+                self._show(self._placeholders.capturing, CameraState.CAPTURING, at_once=True)
             else:
-                self._show(self._placeholders.no_subject, CameraState.NO_SUBJECT)
+                self._show(self._placeholders.no_subject, CameraState.NO_SUBJECT, at_once=True)
             return
         if self._supervisor.submit_frame(frame):
             self._fallback.release(frame.captured_at)
@@ -161,9 +161,9 @@ class CameraLoop:
         codes = DegradationCode.PICTURE_FAILED, DegradationCode.MODELS_MISSING
         return any(map(self._board.is_degraded, codes))
 
-    def _show(self, placeholder: Placeholder, state: CameraState) -> None:
+    def _show(self, placeholder: Placeholder, state: CameraState, at_once: bool = False) -> None:
         self._fallback.forget()
-        self._publisher.show_placeholder(placeholder.image, self._last_index)
+        self._publisher.show_placeholder(placeholder.image, self._last_index, at_once)
         self._board.set_state(state)
 
     def _count(self, frame: Frame) -> None:
