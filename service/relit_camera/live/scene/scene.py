@@ -45,6 +45,6 @@ class Scene:
         """Whether nobody is relit: a placeholder is shown, or the picture as filmed where that is allowed."""
         return self.subject is None and not (self.subject_name == ANYONE and self.look.mode is Mode.LIVE)
 
-    def is_of_subject_of(self, other: Scene) -> bool:
+    def has_same_subject(self, other: Scene) -> bool:
         """Whether the same one is chosen in both, perhaps under another name."""
         return self.subject is other.subject and (self.subject is not None or self.subject_name == other.subject_name)

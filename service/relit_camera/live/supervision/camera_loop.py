@@ -191,7 +191,7 @@ def publish_if_current(publisher: Publisher, scene: Callable[[], Scene], frame: 
     picture may be private by now, nor may a held picture change.
     """
     now, then = scene(), rendered.scene
-    if now.frozen or not now.is_of_subject_of(then) or now.look.mode is not then.look.mode:
+    if now.frozen or not now.has_same_subject(then) or now.look.mode is not then.look.mode:
         return False
     if rendered.unlit and not now.unlit_allowed:
         return False
