@@ -85,6 +85,7 @@ def test_the_pattern_is_told_from_others() -> None:
 @pytest.mark.parametrize("mode", list(Mode))
 def test_no_subject(tmp_path: Path, mode: Mode) -> None:
     with running_camera(tmp_path, memory_source(FILMED), look=LIVE.model_copy(update={"mode": mode})) as camera:
+        wait_until(lambda: camera.status()["state"] == "live")
         camera.put("subject", name=None)
         wait_until(lambda: camera.status()["state"] == "no-subject")
         count = camera.sink.count
