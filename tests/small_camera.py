@@ -140,7 +140,7 @@ def running_camera(
     folder: Path,
     source: Source | None = None,
     tracker: Tracker | None = None,
-    subject: Subject | None = None,
+    subject: Subject | str | None = None,
     look: Look | None = None,
     sink: RememberingSink | None = None,
     new_tracker: Callable[[], Tracker] | None = None,
@@ -149,7 +149,10 @@ def running_camera(
     timings: CameraTimings = DEFAULT_TIMINGS,
     unlit_allowed: bool = False,
 ) -> Iterator[Camera]:
-    """Run a camera with its API on a real port; `folder` is for what it stores."""
+    """Run a camera with its API on a real port; `folder` is for what it stores.
+
+    It shows `subject`, which may be a name that the settings could have, or the generated one.
+    """
     settings = RelitSettings(
         output=OutputSettings(sink="null", width=SIZE[0], height=SIZE[1], fps=FPS, fallback=fallback),
         server=ServerSettings(port=0),
@@ -158,7 +161,10 @@ def running_camera(
     scene_controller = SceneController(settings.storage)
     scene_controller.set_unlit_allowed(unlit_allowed)
     scene_controller.set_look(look or Look(mode=Mode.PORTRAIT, lighting=Lighting(transition_s=0)))
-    scene_controller.show_subject("small", subject or small_subject())
+    if isinstance(subject, str):
+        scene_controller.load_configured_subject(subject)
+    else:
+        scene_controller.show_subject("small", subject or small_subject())
     sink, tracker = sink or RememberingSink(), tracker or SteadyTracker()
     camera_service = CameraService(
         settings, scene_controller, source or memory_source(), sink, tracker, new_tracker, on_viewer, timings

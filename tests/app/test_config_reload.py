@@ -48,12 +48,14 @@ def test_an_edit_of_which_half_cannot_be_used_changes_nothing(folder: Path) -> N
         assert scene_controller.scene is scene
 
 
-def test_a_subject_that_is_no_longer_named_stays(folder: Path) -> None:
+@pytest.mark.parametrize("subject", ["FOLDER/me.relit", "null"])
+def test_a_subject_that_is_no_longer_named_stays(folder: Path, subject: str) -> None:
     """An editor that writes an empty file, or a line that was lost, must not show the room."""
-    scene_controller, before = started(folder, f"subject: {folder}/me.relit")
+    scene_controller, before = started(folder, f"subject: {subject.replace('FOLDER', str(folder))}")
+    scene = scene_controller.scene
     with pytest.raises(ConfigError, match="no longer names the subject"):
         apply_edited_settings(scene_controller, before, before, settings(folder, ""))
-    assert scene_controller.scene.subject is not None
+    assert scene_controller.scene is scene
     assert apply_edited_settings(scene_controller, before, before, settings(folder, "subject: null")) is None
     assert scene_controller.scene.subject is None
 

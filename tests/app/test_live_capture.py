@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from relit_camera.app.captures.live_capture import LiveCapture, LiveCaptureTimings, SubjectBuilder
-from relit_camera.base.config.look import Look, Mode
+from relit_camera.base.config.look import ANYONE, Look, Mode
 from relit_camera.base.config.settings import StorageSettings
 from relit_camera.base.errors import ConflictError, InputError, NotFoundError
 from relit_camera.base.images.image_types import Frame
@@ -118,6 +118,18 @@ def test_a_subject_that_somebody_chose_meanwhile_stays(studio: Callable[[Subject
     wait_until(camera.ended)
     assert camera.scenes.scene.subject_name == "other"
     assert camera.scenes.scene.look.mode is Mode.PORTRAIT
+    assert camera.scenes.subjects.names() == ["me"]
+
+
+def test_whoever_hid_meanwhile_stays_hidden(studio: Callable[[SubjectBuilder], Studio]) -> None:
+    camera = studio(build)
+    camera.scenes.choose_stored_subject(ANYONE)
+    camera.on = False
+    camera.capture.start("me")
+    camera.scenes.choose_stored_subject(None)
+    camera.on = True
+    wait_until(camera.ended)
+    assert camera.scenes.scene.shows_nobody
     assert camera.scenes.subjects.names() == ["me"]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -10,20 +11,28 @@ import httpx
 import numpy as np
 import pytest
 
-from relit_camera.base.config.look import Lighting, Look, Mode
+from relit_camera.app import wiring
+from relit_camera.app.camera_service import NO_SUBJECT_MESSAGE
+from relit_camera.base.config.look import ANYONE, Lighting, Look, Mode
 from relit_camera.base.config.settings import Fallback
+from relit_camera.base.errors import ModelError
 from relit_camera.base.images.image_types import DisplayImage, Frame
 from relit_camera.base.rotations import rotation_from_angles
 from relit_camera.face.face_state import LOST, FaceState
+from relit_camera.live.publishing.placeholder_image import placeholder
 from relit_camera.live.status.camera_status import DegradationCode
 from relit_camera.subject.relighting.basis_relighter import BasisRelighter
+from relit_camera.subject.subject import Subject
 from tests.api.api_client import decoded_picture
 from tests.app.test_camera_service import IMPATIENT
 from tests.small_camera import (
     FPS,
+    PATIENT,
     SIZE,
+    WAIT_S,
     Camera,
     SteadyTracker,
+    difference,
     memory_source,
     running_camera,
     wait_until,
@@ -76,10 +85,52 @@ def test_the_pattern_is_told_from_others() -> None:
 @pytest.mark.parametrize("mode", list(Mode))
 def test_no_subject(tmp_path: Path, mode: Mode) -> None:
     with running_camera(tmp_path, memory_source(FILMED), look=LIVE.model_copy(update={"mode": mode})) as camera:
+        wait_until(lambda: camera.status()["state"] == "live")
         camera.put("subject", name=None)
         wait_until(lambda: camera.status()["state"] == "no-subject")
+        count = camera.sink.count
+        wait_until(lambda: camera.sink.count >= count + 2)
+        assert difference(camera.sink.new[-1], placeholder(SIZE, NO_SUBJECT_MESSAGE)) == 0  # and not the last picture
         check_nothing_as_filmed(camera)
         assert DegradationCode.NO_SUBJECT in camera.degraded()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sees", [True, False], ids=["seen at once", "never there"])
+def test_whoever_comes_is_relit_from_the_first_picture(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sees: bool
+) -> None:
+    """Before what relights them is made the placeholder alone is published, however long that takes."""
+    made, make = threading.Event(), wiring._make_anyone
+
+    def make_late() -> Subject:
+        assert made.wait(WAIT_S)
+        return make()
+
+    monkeypatch.setattr(wiring, "_make_anyone", make_late)
+    source, tracker = memory_source(FILMED), Tracker(lambda index: sees)
+    with running_camera(tmp_path, source, tracker, subject=ANYONE, look=LIVE, timings=PATIENT) as camera:
+        wait_until(lambda: camera.sink.count >= ONE_S)
+        (shown,) = camera.sink.new
+        assert difference(shown, placeholder(SIZE, "starting")) == 0
+        made.set()
+        camera.sink.wait_for(SETTLED)
+        check_nothing_as_filmed(camera)
+
+
+class TrackerWithoutModels(SteadyTracker):
+    def track(self, frame: Frame) -> FaceState:
+        raise ModelError("models are missing", "run: relit models pull")
+
+
+def test_without_models_whoever_comes_is_a_placeholder(tmp_path: Path) -> None:
+    tracker = TrackerWithoutModels()
+    with running_camera(tmp_path, memory_source(FILMED), tracker, subject=ANYONE, look=LIVE) as camera:
+        wait_until(lambda: camera.status()["state"] == "standing-in")
+        wait_until(lambda: camera.sink.count >= ONE_S)
+        placeholders = [placeholder(SIZE, why) for why in ("starting", "the picture has failed: see the panel")]
+        assert all(min(difference(shown, each) for each in placeholders) == 0 for shown in camera.sink.new)
+        assert not camera.status()["unlit"]
 
 
 def test_it_is_published_once_that_is_confirmed_and_no_longer_when_it_is_withdrawn(tmp_path: Path) -> None:

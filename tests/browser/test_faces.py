@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 from playwright.sync_api import Route, expect
@@ -157,6 +158,35 @@ def test_who_chose_nobody_is_nobody_after_being_unlit(fake: FakeServer, open_pag
     fake.wait_for("scene", unlit_allowed=True)
     panel.page.locator("#unlit-allow").click()
     fake.wait_for("scene", unlit_allowed=False, subject=None)
+    expect(panel.doors).to_be_visible()
+
+
+def test_whoever_comes_is_chosen_hidden_and_asked_for_a_picture_before_they_are_moved(
+    fake: FakeServer, open_page: OpenPage
+) -> None:
+    panel = open_panel(open_page, fake.url)
+    told, ladder = panel.page.locator("#doors-now"), panel.page.locator("#ladder")
+    fake.patch("scene", mode="portrait")
+    panel.face("Anyone").click()
+    fake.wait_for("scene", subject="anyone", mode="live")
+    expect(panel.face("Anyone")).to_have_attribute("aria-pressed", "true")
+    expect(panel.doors).to_be_hidden()
+    expect(ladder).to_contain_text("You are lit as an average head would be.")
+    expect(ladder.get_by_role("link", name=re.compile("film yourself"))).to_have_attribute("href", "/film")
+    assert panel.places_shown_on_me() == 0
+    ladder.get_by_role("button", name="Another face…").click()
+    expect(told).to_have_text("Others see you, lit as an average head would be.")
+    panel.page.keyboard.press("Escape")
+    expect(panel.doors).to_be_hidden()
+    panel.page.locator("#mode").get_by_role("button", name=re.compile("Portrait")).click()
+    expect(panel.doors).to_be_visible()
+    expect(told).to_contain_text("Portrait moves a picture of you, and there is none yet.")
+    expect(ladder).not_to_contain_text("You are lit")
+    panel.page.locator("#door-anyone").click()
+    fake.wait_for("scene", subject="anyone", mode="live")
+    expect(panel.doors).to_be_hidden()
+    panel.face("Nobody").click()
+    fake.wait_for("scene", subject=None)
     expect(panel.doors).to_be_visible()
 
 

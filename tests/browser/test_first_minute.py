@@ -215,6 +215,24 @@ def test_the_look_is_kept_over_a_restart(tmp_path: Path, open_page: OpenPage) ->
         expect(panel.place("night-street")).to_have_attribute("aria-pressed", "true")
 
 
+def test_who_hides_is_hidden_after_a_restart_until_they_ask_to_be_relit(tmp_path: Path, open_page: OpenPage) -> None:
+    with camera_on_clip(tmp_path) as camera:
+        panel = open_panel(open_page, camera.url)
+        expect(panel.doors).to_be_hidden()
+        camera.wait_for("status", state="live", subject="anyone")
+        panel.page.locator("#hide").click()
+        expect(panel.doors).to_be_visible()
+        expect(panel.page.locator("#hide")).to_be_hidden()
+        camera.wait_for("status", state="no-subject", subject=None)
+    with camera_on_clip(tmp_path) as camera:
+        panel = open_panel(open_page, camera.url)
+        expect(panel.doors).to_be_visible()
+        camera.wait_for("status", state="no-subject", subject=None)
+        panel.page.get_by_role("button", name="Relight my live picture").click()
+        expect(panel.doors).to_be_hidden()
+        camera.wait_for("status", state="live", subject="anyone")
+
+
 def test_each_state_of_the_camera_is_told_in_words(fake: FakeServer, open_page: OpenPage) -> None:
     """The program's own name of a state, `No-subject.`, was shown."""
     panel = open_panel(open_page, fake.url)

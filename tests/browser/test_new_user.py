@@ -32,6 +32,7 @@ from tests.browser.browser_pages import OpenPage
 from tests.browser.cameras import START_S, Api, FakeServer, camera_process, fake_server
 from tests.browser.conftest import Timed
 from tests.browser.panel import Panel, open_panel
+from tests.browser.test_privacy import FACE, is_raw
 from tests.devices.test_webcam_controls import FakeWebcam
 from tests.small_camera import wait_until
 
@@ -89,9 +90,41 @@ def test_the_demonstration(tmp_path: Path, open_page: OpenPage, timed: Timed) ->
             wait_for_change(camera, before)
 
 
+def test_whoever_comes_is_relit_at_once_and_makes_that_their_subject(
+    tmp_path: Path, models: Path, open_page: OpenPage, timed: Timed
+) -> None:
+    """With the bundled clip as webcam, and nothing said of who is to be shown."""
+    with camera_process(
+        tmp_path, "run", "--source", demo_files.CLIP, models=models, settings="look: {lighting: {environment: party}}"
+    ) as camera:
+        with timed("open the page, be relit"):
+            panel = open_panel(open_page, camera.url)
+            camera.wait_for("status", state="live", subject="anyone", unlit=False)
+            assert not is_raw(camera, FACE)
+        page, dialog = panel.page, panel.page.locator("#face-dialog")
+        expect(panel.doors).to_be_hidden()
+        expect(panel.face("Anyone")).to_have_attribute("aria-pressed", "true")
+        expect(page.locator("#ladder-line")).to_have_text("You are lit as an average head would be.")
+        with timed("Make this my subject"):
+            page.locator("#ladder").get_by_role("button", name="Make this my subject").click()
+            expect(page.locator("#framing li[data-of=distance]")).not_to_have_attribute(
+                "data-state", "unknown", timeout=STEP_MS
+            )
+            page.locator("#face-start").click()
+            expect(dialog).to_have_attribute("data-step", "done", timeout=STEP_MS)
+            page.locator("#face-keep").click()
+        (stored,) = camera.get("subjects")
+        assert stored["is_current"]
+        expect(page.locator("#ladder-line")).to_contain_text("light of a room")
+        expect(panel.face(stored["name"])).to_have_attribute("aria-pressed", "true")
+
+
 def test_one_s_own_face_from_a_recorded_webcam(tmp_path: Path, models: Path, open_page: OpenPage, timed: Timed) -> None:
     """Instant, with the bundled clip as webcam: not more than two minutes after set-up."""
-    with camera_process(tmp_path, "run", "--source", demo_files.CLIP, models=models) as camera, timed("all of it"):
+    hidden_at_first = camera_process(
+        tmp_path, "run", "--source", demo_files.CLIP, models=models, settings="subject: null"
+    )
+    with hidden_at_first as camera, timed("all of it"):
         with timed("open the page, see the doors"):
             panel = open_panel(open_page, camera.url)
             expect(panel.doors).to_be_visible()

@@ -25,9 +25,10 @@ END_S = 3.0
 CLIP_FRAMES = 40
 
 
-def arguments(material: Material, *more: object) -> list[object]:
+def arguments(material: Material, *more: object, named: bool = True) -> list[object]:
+    subject = ("--subject", material.subject) if named else ()
     return [
-        "run", "--source", material.clip, "--sink", "null", "--port", 0, "--subject", material.subject,
+        "run", "--source", material.clip, "--sink", "null", "--port", 0, *subject,
         "--tracker", material.tracker, "--size", "128x96", *more,
     ]  # fmt: skip
 
@@ -40,9 +41,11 @@ def running(
     full_at: int | None = None,
     config: Path | None = None,
     check_period_s: float | None = None,
+    named: bool = True,
 ) -> Iterator[tuple[subprocess.Popen[str], httpx.Client]]:
     first = ("--config", config) if config else ()
-    process = start(*first, *arguments(material, *more), folder=folder, full_at=full_at, check_period_s=check_period_s)
+    options = arguments(material, *more, named=named)
+    process = start(*first, *options, folder=folder, full_at=full_at, check_period_s=check_period_s)
     try:
         assert process.stdout is not None
         line = process.stdout.readline()
@@ -136,6 +139,24 @@ def test_light_changes_while_it_runs_the_clip_loops_and_sigterm_ends_it(material
         assert troubles(http) == {}
         assert http.get("lighting").json()["lamps"][0]["azimuth_deg"] == 90
         check_end(process, http, signal.SIGTERM)
+
+
+@pytest.mark.slow
+def test_without_a_subject_whoever_comes_is_relit_until_they_hide(material: Material, tmp_path: Path) -> None:
+    with running(material, tmp_path, named=False) as (process, http):
+        assert http.get("subject").json() == {"name": "anyone"}
+        wait_for_state(http, "live")
+        status = http.get("status").json()
+        assert (status["subject"], status["unlit"]) == ("anyone", False)
+        assert troubles(http) == {}
+        assert http.put("subject", json={"name": None}).status_code == 200
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(WAIT_S) == 0
+        assert process.stderr is not None
+        assert "whoever comes is relit; to hide them" in process.stderr.read()
+    with running(material, tmp_path, named=False) as (_, http):
+        assert http.get("subject").json() == {"name": None}
+        wait_for_state(http, "no-subject")
 
 
 @pytest.mark.slow

@@ -289,7 +289,9 @@ def test_systemd_finds_no_fault_with_the_unit(tmp_path: Path) -> None:
 
 
 def test_the_subject_is_looked_at(settings: RelitSettings, tmp_path: Path) -> None:
-    expect(check_subject(settings), Severity.WARNING, "none is chosen", "relit capture build")
+    expect(check_subject(settings), Severity.WARNING, "lit as an average head would be", "relit capture build")
+    hidden = settings.model_copy(update={"subject": None})
+    expect(check_subject(hidden), Severity.WARNING, "a placeholder is shown", "relit capture build")
     settings.storage.subjects.mkdir(parents=True)
     write_subject(settings.storage.subjects / "me.relit", small_subject())
     expect(check_subject(settings), Severity.WARNING, "stored are: me")

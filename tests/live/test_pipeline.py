@@ -18,7 +18,7 @@ import pytest
 
 from relit_camera.app.demo import demo_files
 from relit_camera.app.wiring import make_follower, make_pipeline, mode_factories
-from relit_camera.base.config.look import ColorBackground, Lamp, Lighting, Look, Mode
+from relit_camera.base.config.look import ANYONE, ColorBackground, Lamp, Lighting, Look, Mode
 from relit_camera.base.config.settings import InferenceSettings, OutputSettings, RelitSettings
 from relit_camera.base.errors import ModelError
 from relit_camera.base.images.image_files import write_display
@@ -43,7 +43,7 @@ from relit_camera.live.render_quality import FULL_QUALITY, QUALITY_LEVELS, Rende
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.status.camera_status import DegradationCode
 from relit_camera.subject.relighting.relighter import Relighter, open_relighter
-from relit_camera.subject.subject import ANYONE, Subject
+from relit_camera.subject.subject import Subject
 from relit_camera.subject.subject_file import read_subject
 from tests.generated_subject import small_subject
 from tests.small_camera import SIZE, Embedder, SteadyTracker, difference, grey

@@ -27,8 +27,8 @@ def apply_edited_settings(
     Raises:
         RelitError: something that the edit names does not exist, or cannot be used; then nothing is changed.
     """
-    if after.subject is None and before.subject is not None and "subject" not in after.model_fields_set:
-        # An edit that only lost this line would otherwise show nobody.
+    if after.subject != before.subject and "subject" not in after.model_fields_set:
+        # An edit that only lost this line would otherwise show whoever comes.
         raise ConfigError("it no longer names the subject", "name one, or write 'subject: null' for nobody")
     chosen = scene_controller.resolve_subject(after.subject) if after.subject != before.subject else None
     if after.look != before.look or chosen is not None:

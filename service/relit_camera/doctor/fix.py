@@ -28,7 +28,7 @@ DEFAULT_CONFIG_TEXT = """\
 # Relit Camera's settings; what is not here has its default. `relit config schema` lists all of them, `relit config
 # check` tells whether this file is right, `relit config show` what is in force.
 
-subject: null               # who is shown: a stored subject's name or a .relit file; null is the live picture as it is
+subject: anyone             # who is shown: a stored subject's name, a .relit file, anyone (whoever comes), null: nobody
 
 source:
   source: webcam            # webcam, a camera's id from `relit devices`, a video or picture file, or pattern

@@ -72,16 +72,17 @@ def _provider_cure(provider: str) -> str:
 
 
 def check_subject(settings: RelitSettings) -> Finding:
-    """Check that the subject in the settings exists and can be read. Without one a placeholder is shown."""
+    """Check that the subject in the settings exists and can be read."""
     topic, store = "subject", SubjectStore(settings.storage.subjects, copied=True)  # as the camera does
     stored = ", ".join(store.names())
-    if settings.subject is None:
+    if settings.named_subject is None:
+        shown = "a placeholder is shown" if settings.subject is None else "you are lit as an average head would be"
         cure = f"choose one by `subject:` in config.yaml or --subject; stored are: {stored}"
         if not stored:
             cure = "make one: relit capture build FILM --out me.relit; or see `relit demo`"
-        return warning(topic, "none is chosen: a placeholder is shown", cure)
+        return warning(topic, f"none is chosen: {shown}", cure)
     try:
-        name, subject = store.resolve(settings.subject)
+        name, subject = store.resolve(settings.named_subject)
     except RelitError as error:
         return problem_from_error(topic, error)
     return ok(topic, f"{name}, {subject.metadata.width}x{subject.metadata.height}")

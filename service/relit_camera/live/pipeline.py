@@ -186,7 +186,7 @@ class Pipeline:
         self._placeholder = None
         subject = scene.subject
         if is_other and scene.look.mode is Mode.LIVE:
-            self._note_other_person("you are lit as a mean head would be", scene, "or take one")
+            self._note_other_person("you are lit as an average head would be", scene, "or take one")
             subject = None
         else:
             self._troubles.pop("identity", None)

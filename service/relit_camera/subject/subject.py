@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
+from relit_camera.base.config.look import ANYONE
 from relit_camera.base.images.image_types import DisplayImage, Mask, Points
 from relit_camera.subject.compression.local_basis import LocalBasis
 from relit_camera.subject.expression_stills import ExpressionStill
@@ -20,8 +21,6 @@ from relit_camera.subject.reflectance_field import TEXELS
 from relit_camera.subject.rungs import Rung
 
 FORMAT_VERSION: Literal[2] = 2
-ANYONE = "anyone"
-"""The name, and the method, of the subject that is nobody's."""
 MIN_SIDE_PX, MAX_SIDE_PX = 8, 8192
 """Least and largest side of a subject's picture, in pixels."""
 HORIZON_STEP_RAD = np.pi / 255

@@ -7,11 +7,12 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from relit_camera.base.concurrency.decoding_process import DECODING_PROCESS, Decoded
+from relit_camera.base.config.look import ANYONE
 from relit_camera.base.errors import ConflictError, NotFoundError, SubjectError
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.storage.atomic_files import make_folder, storage_error
 from relit_camera.base.storage.named_files import NamedFiles
-from relit_camera.subject.subject import ANYONE, Subject, SubjectMetadata
+from relit_camera.subject.subject import Subject, SubjectMetadata
 from relit_camera.subject.subject_file import SUFFIX, read_metadata, read_neutral, read_subject
 
 

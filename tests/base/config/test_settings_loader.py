@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import pytest
 import yaml
 
+from relit_camera.base.config.look import ANYONE
 from relit_camera.base.config.settings import RelitSettings
 from relit_camera.base.config.settings_loader import config_path, load_settings
 from relit_camera.base.errors import ConfigError
@@ -52,9 +53,14 @@ def test_without_a_file_the_defaults_hold() -> None:
     assert values(load_settings()) == values(RelitSettings())
 
 
-@pytest.mark.parametrize("text", ["", "# nothing\n", "server:\n", "server:\n  # port: 9\nsubject:\n", "{}"])
+@pytest.mark.parametrize("text", ["", "# nothing\n", "server:\n", "server:\n  # port: 9\nmatte:\n", "{}"])
 def test_a_file_or_section_without_values_changes_nothing(write: WriteConfig, text: str) -> None:
     assert values(load_settings(write(text))) == values(RelitSettings())
+
+
+def test_a_subject_of_null_is_nobody(write: WriteConfig) -> None:
+    assert load_settings(write("")).subject == ANYONE
+    assert load_settings(write("subject: null")).subject is None
 
 
 def test_the_file_is_found_where_it_is_usual(

@@ -80,8 +80,8 @@ class Publishing:
             lambda: self.publisher.pictures.put(PublishedPicture(image(value), self.clock.now() - age_s, value, unlit)),
         )
 
-    def show_placeholder(self, at: float, value: int, last_index: int) -> None:
-        self.clock.at(at, lambda: self.publisher.show_placeholder(image(value), last_index))
+    def show_placeholder(self, at: float, value: int, last_index: int, at_once: bool = False) -> None:
+        self.clock.at(at, lambda: self.publisher.show_placeholder(image(value), last_index, at_once))
 
     def run(self, seconds: float) -> RecordingSink:
         """Publish for some seconds."""
@@ -231,6 +231,16 @@ def test_a_late_picture_does_not_replace_the_placeholder() -> None:
     assert [camera.shown_at(at) for at in (0.4, 0.6, 1.1, 2.1, 5.1, 6.2, 7.1)] == [7, 8, 1, 2, 9, 9, 4]
     assert 3 not in sink.values
     assert camera.publisher.counts.dropped == 1
+
+
+def test_whoever_hides_is_gone_at_once() -> None:
+    camera = Publishing(stale_after_s=3.0)
+    camera.put(1.0, 1)
+    camera.show_placeholder(1.5, 8, last_index=2, at_once=True)
+    camera.put(1.6, 2)  # late
+    camera.put(2.0, 3)
+    camera.run(3.0)
+    assert [camera.shown_at(at) for at in (1.45, 1.55, 1.7, 2.1)] == [1, 8, 8, 3]
 
 
 def test_a_held_picture_stays_and_a_replaced_one_does_not_come_back() -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from relit_camera.base.config.look import ColorBackground, Lighting, Look, Mode, Preset
+from relit_camera.base.config.look import ANYONE, ColorBackground, Lighting, Look, Mode, Preset
 from relit_camera.base.config.preset_store import PresetStore
 from relit_camera.base.config.settings import OutputSettings, RelitSettings, StorageSettings
 from relit_camera.base.errors import NotReadyError, StorageError
@@ -67,7 +67,7 @@ def sunset_portrait(controller: SceneController) -> None:
 
 def test_look_and_subject_are_those_of_the_last_run(folder: Path) -> None:
     first = run(settings(folder), sunset_portrait)
-    assert (first.subject_name, first.look) == (None, Look())
+    assert (first.subject_name, first.look) == (ANYONE, Look())
     again = run(settings(folder))
     assert (again.subject_name, again.look.lighting.environment, again.look.mode) == ("ada", "sunset", Mode.PORTRAIT)
     assert again.environment is not None
@@ -97,7 +97,7 @@ def test_what_was_edited_in_the_configuration_since_wins(folder: Path) -> None:
     again = run(edited)
     assert (again.look.lighting.yaw_deg, again.look.lighting.environment, again.subject_name) == (-10, "sunset", "ada")
     other = settings(folder, look={"lighting": {"saturation": 0.5, "yaw_deg": -10}})
-    assert run(other).subject_name is None
+    assert run(other).subject_name == ANYONE
 
 
 def test_a_preset_at_start_wins_over_the_last_run(folder: Path) -> None:
@@ -146,7 +146,7 @@ def test_a_subject_that_is_not_stored_is_left_to_the_settings(folder: Path, tmp_
     run(settings(folder, subject=str(file)), lambda controller: controller.set_look(Look(mode=Mode.PORTRAIT)))
     again = run(settings(folder, subject=str(file)))
     assert (again.subject_name, again.look.mode) == ("me", Mode.PORTRAIT)
-    assert run(settings(folder)).subject_name is None
+    assert run(settings(folder)).subject_name == ANYONE
 
 
 def test_what_is_gone_is_left_out_and_said(folder: Path, caplog: pytest.LogCaptureFixture) -> None:
@@ -173,6 +173,72 @@ def test_a_damaged_file_is_said_and_left_out(folder: Path, text: str, caplog: py
     assert run(settings(folder), sunset_portrait).look == Look()
     assert "last-scene.yaml" in caplog.text
     assert run(settings(folder)).subject_name == "ada"
+
+
+# Whoever comes, and nobody
+
+
+def hide(controller: SceneController) -> None:
+    controller.choose_stored_subject(None)
+
+
+def test_whoever_comes_is_relit_until_somebody_chooses(folder: Path, caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level("INFO", "relit_camera")
+    first = run(settings(folder), lambda controller: controller.set_look(Look(lighting=Lighting(yaw_deg=9))))
+    assert (first.subject_name, first.shows_nobody) == (ANYONE, False)
+    assert "to hide them" in caplog.text
+    again = run(settings(folder))
+    assert (again.subject_name, again.look.lighting.yaw_deg) == (ANYONE, 9)
+
+
+def test_whoever_hid_is_hidden_after_a_restart(folder: Path, caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level("INFO", "relit_camera")
+    run(settings(folder), hide)
+    caplog.clear()
+    assert run(settings(folder)).shows_nobody
+    assert "to hide them" not in caplog.text
+    assert run(settings(folder), instant=True).shows_nobody
+    assert run(settings(folder, subject="bea")).subject_name == "bea"  # somebody has written that since
+    assert run(settings(folder, subject="bea"), hide).subject_name == "bea"
+    assert run(settings(folder)).shows_nobody  # and taken it away again
+
+
+def test_an_explicit_choice_of_the_settings_is_kept_to(folder: Path) -> None:
+    assert run(settings(folder, subject=None)).shows_nobody
+    run(settings(folder), lambda controller: controller.set_look(Look(mode=Mode.PORTRAIT)))
+    assert run(settings(folder, subject=None)).subject_name is None
+    run(settings(folder, subject=None), hide)
+    assert run(settings(folder, subject=ANYONE)).subject_name == ANYONE
+
+
+@pytest.mark.parametrize("kept", ["{look: {}, subject: null}", "{look: {}, subject: null, configured_subject: null}"])
+def test_nobody_of_a_version_before_stays_nobody(folder: Path, kept: str) -> None:
+    """It wrote the same where nobody was ever chosen: whoever was not seen then is not seen now."""
+    kept_scene_path(StorageSettings(data_dir=folder)).write_text(kept)
+    assert run(settings(folder)).shows_nobody
+
+
+def test_a_face_that_is_gone_is_not_replaced_by_the_live_picture(
+    folder: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    run(settings(folder), lambda controller: controller.choose_stored_subject("ada"))
+    SceneController(StorageSettings(data_dir=folder)).subjects.remove("ada")
+    assert run(settings(folder)).shows_nobody
+    assert "ada" in caplog.text
+    assert run(settings(folder, subject="bea")).subject_name == "bea"
+
+
+def test_a_damaged_file_shows_nobody_since_that_may_have_been_chosen(folder: Path) -> None:
+    kept_scene_path(StorageSettings(data_dir=folder)).write_text("look: [")
+    assert run(settings(folder)).shows_nobody
+
+
+def test_reset_shows_whoever_is_shown(folder: Path) -> None:
+    controller = SceneController(StorageSettings(data_dir=folder))
+    show_first_scene(controller, settings(folder), given=NOTHING_GIVEN)
+    for name in (None, "ada"):
+        controller.choose_stored_subject(name)
+        assert controller.reset().subject_name == name
 
 
 # Nothing as filmed unasked

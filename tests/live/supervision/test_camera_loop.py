@@ -10,7 +10,7 @@ from typing import cast
 import numpy as np
 import pytest
 
-from relit_camera.base.config.look import Look, Mode
+from relit_camera.base.config.look import ANYONE, Look, Mode
 from relit_camera.base.errors import VideoError
 from relit_camera.base.images.image_types import DisplayImage, Frame
 from relit_camera.base.rotations import Rotation
@@ -31,7 +31,6 @@ from relit_camera.live.status.status_board import StatusBoard
 from relit_camera.live.supervision.camera_loop import CameraLoop, Placeholders, publish_if_current
 from relit_camera.live.supervision.fallback_renderer import FallbackPicture, FallbackRenderer
 from relit_camera.live.supervision.pipeline_supervisor import PipelineSupervisor, ShownPicture
-from relit_camera.subject.subject import ANYONE
 from tests.virtual_clock import VirtualClock
 
 SIZE = (8, 6)
@@ -390,7 +389,14 @@ def test_nothing_follows_stopping(camera: LoopUnderTest) -> None:
 
 
 @pytest.mark.parametrize(
-    "changed", [{"frozen": True}, {"subject": object()}, {"look": Look(mode=Mode.PORTRAIT)}, {"revision": 9}]
+    "changed",
+    [
+        {"frozen": True},
+        {"subject": object()},
+        {"subject_name": ANYONE},
+        {"look": Look(mode=Mode.PORTRAIT)},
+        {"revision": 9},
+    ],
 )
 def test_a_late_picture_of_another_subject_or_mode_is_not_published(
     camera: LoopUnderTest, changed: dict[str, object]

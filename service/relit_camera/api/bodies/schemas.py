@@ -33,14 +33,17 @@ class SubjectChoice(ApiModel):
     """Who is shown."""
 
     name: SubjectName | None
-    """A stored subject, or null for nobody: then a placeholder is shown, or the live picture where that is allowed."""
+    """A stored subject, `anyone` for whoever comes, or null for nobody.
+
+    For nobody a placeholder is shown, or the live picture where that is allowed; in mode portrait for `anyone` too.
+    """
 
 
 class CurrentSubject(ApiModel):
     """Who is shown now."""
 
     name: str | None
-    """The subject's name, which may be that of a file given on the command line; null for nobody."""
+    """The subject's name, which may be that of a file given on the command line, or `anyone`; null for nobody."""
 
 
 class SubjectItem(ApiModel):
@@ -172,7 +175,7 @@ class SceneChanges(ApiModel):
     """Replaced as a whole."""
     mode: Mode = Mode.LIVE
     subject: SubjectName | None = None
-    """A stored subject, or null for nobody."""
+    """A stored subject, `anyone` for whoever comes, or null for nobody."""
     frozen: bool = False
     unlit_allowed: bool = False
     """Whether the picture as filmed may be published: a person must have confirmed that. Not kept over a restart."""

@@ -5,15 +5,17 @@ import "./camera/status.js";
 import { keepFocus } from "./focus.js";
 import { on, openEvents } from "./stage/events.js";
 import { firstPicture, openPreview, showBefore } from "./stage/preview.js";
-import { change, onScene, scene, step } from "./stage/scene.js";
+import { change, onScene, scene, showsNobody, step } from "./stage/scene.js";
 import { hideUnlit } from "./stage/unlit.js";
 import { setAttribute, setEnabled } from "./widgets.js";
 
 const RETRY_MS = 3000;
 const byId = (id) => document.getElementById(id);
 
-// Before all else, and without the controls: nobody is to be shown unlit for longer than they want
+// Before all else, and without the controls: nobody is to be shown for longer than they want
 byId("unlit-stop").onclick = hideUnlit;
+byId("hide").onclick = () => change({ subject: null, unlit_allowed: false, frozen: false });
+onScene((now) => { byId("hide").hidden = showsNobody(now); });
 keepFocus();
 
 // Undo, redo, reset

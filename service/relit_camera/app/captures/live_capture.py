@@ -166,7 +166,7 @@ class LiveCapture:
             while not begins:
                 if self._clock.wait(canceled, pause_s):
                     return CaptureStatus(CaptureStage.CANCELED, name)
-                if self._maker.shown().subject is not before.subject:
+                if not self._maker.shown().has_same_subject(before):
                     return status  # somebody has chosen another one
                 begins = self._begin_again(canceled, status)
             pause_s = min(2 * pause_s, self._timings.most_retry_s)

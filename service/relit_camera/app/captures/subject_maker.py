@@ -98,7 +98,7 @@ class SubjectMaker:
             require_replaceable(subjects, name, replaced, "rename or delete that one, then start again")
         self._events.publish("collection", name="subjects")
         now = self.shown()
-        if now.subject is before.subject:
+        if now.has_same_subject(before):
             mode = Mode.LIVE if now.mode_revision == before.mode_revision else None
             try:
                 self._scene_controller.choose_stored_subject(name, mode)

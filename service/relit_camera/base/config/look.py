@@ -16,6 +16,8 @@ StoredName = Annotated[str, Field(pattern=NAME_PATTERN), AfterValidator(require_
 so that it is safe as a file name everywhere."""
 
 
+ANYONE = "anyone"
+"""The name, and the method, of the subject that is nobody's: whoever comes is relit."""
 SubjectName = Annotated[str, Field(min_length=1, max_length=120, pattern=r"^[^/\\\x00-\x1f]+$")]
 """A subject's name, which may be that of any file put into the folder by hand."""
 

@@ -12,7 +12,7 @@ from pydantic import Field, SecretStr, field_validator, model_validator
 from pydantic.json_schema import SkipJsonSchema
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
-from relit_camera.base.config.look import Look, SettingsModel
+from relit_camera.base.config.look import ANYONE, Look, SettingsModel
 
 EvenSize = Annotated[int, Field(ge=64, le=8192, multiple_of=2)]
 HostAndPort = Annotated[str, Field(pattern=r"^([a-z0-9.-]{1,253}|\[[0-9a-f:.]+\])(:[0-9]{1,5})?$")]
@@ -214,8 +214,8 @@ class RelitSettings(BaseSettings):
 
     source: SourceSettings = SourceSettings()
     output: OutputSettings = OutputSettings()
-    subject: str | None = None
-    """A stored subject's name, or the path of a .relit file."""
+    subject: str | None = ANYONE
+    """A stored subject's name, the path of a .relit file, `anyone`: whoever comes, or null: nobody."""
     look: Look = Look()
     tracker: TrackerSettings = TrackerSettings()
     matte: str = "selfie"
@@ -228,3 +228,8 @@ class RelitSettings(BaseSettings):
     server: ServerSettings = ServerSettings()
     storage: StorageSettings = StorageSettings()
     log_level: Literal["debug", "info", "warning", "error"] = "info"
+
+    @property
+    def named_subject(self) -> str | None:
+        """The subject, where it is one person's."""
+        return None if self.subject == ANYONE else self.subject

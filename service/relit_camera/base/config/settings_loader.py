@@ -21,7 +21,7 @@ NON_SETTING_VARIABLES = frozenset({CONFIG_VARIABLE, "RELIT_MODELS_DIR", "RELIT_S
 """Variables with the prefix RELIT_ that are no settings."""
 
 NestedValues = Mapping[str, Any]
-_SECTIONS = frozenset(name for name, field in RelitSettings.model_fields.items() if field.default is not None)
+_SECTIONS = frozenset(RelitSettings.model_fields) - {"subject"}
 """Keys that are not null."""
 
 

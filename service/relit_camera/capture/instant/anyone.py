@@ -12,6 +12,7 @@ from functools import lru_cache
 import cv2
 import numpy as np
 
+from relit_camera.base.config.look import ANYONE
 from relit_camera.base.images.image_types import Mask, Points
 from relit_camera.base.rotations import Rotation
 from relit_camera.capture.instant.face_selection import SCHEME
@@ -20,7 +21,7 @@ from relit_camera.capture.instant.instant_capture import capture_from_picture
 from relit_camera.capture.instant.median_picture import MedianPicture
 from relit_camera.face.head_pose import HeadPose, project
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
-from relit_camera.subject.subject import ANYONE, Subject
+from relit_camera.subject.subject import Subject
 
 SIDE_PX, SIDE_CM = 112, 44.0
 """Of its picture; a person's own has more, but only detail that a stranger does not have anyway."""

@@ -86,7 +86,7 @@ def bench(
     if video is None:
         settings = bundled_settings(settings)
     elif subject is None:
-        settings = settings.model_copy(update={"subject": settings.subject or str(demo_files.SUBJECT)})
+        settings = settings.model_copy(update={"subject": settings.named_subject or str(demo_files.SUBJECT)})
     if tracker is not None:
         settings = settings.model_copy(update={"tracker": settings.tracker.model_copy(update={"name": tracker})})
     result: dict[str, Any] = {"machine": machine_info()}

@@ -44,7 +44,7 @@ def replay(
 ) -> None:
     """Relight a recorded video.
 
-    Without a subject, whoever is in it is lit as a mean head of their skin would be; with one, the better for it.
+    Without a subject, whoever is in it is lit as an average head of their skin would be; with one, the better for it.
     """
     import json
     import sys
@@ -53,7 +53,7 @@ def replay(
     from relit_camera.app.replay.video_replay import replay as run_replay
     from relit_camera.app.wiring import make_pipeline, make_tracker
     from relit_camera.base.concurrency.threads import limit_threads
-    from relit_camera.base.config.look import Look, Mode
+    from relit_camera.base.config.look import ANYONE, Look, Mode
     from relit_camera.base.images.contact_sheet import contact_sheet as draw_sheet
     from relit_camera.base.images.image_files import encode_display
     from relit_camera.base.images.image_types import DisplayImage
@@ -63,7 +63,6 @@ def replay(
     from relit_camera.cli.model_offer import offer_models
     from relit_camera.cli.progress import progress_bar
     from relit_camera.live.scene.scene_controller import SceneController
-    from relit_camera.subject.subject import ANYONE
 
     if contact_sheet and contact_sheet.suffix.lower() not in (".png", ".jpg", ".jpeg"):
         raise typer.BadParameter(f"{contact_sheet} is neither .png nor .jpg", param_hint="--contact-sheet")
@@ -167,7 +166,7 @@ def _instant_subject(video: Path, settings: RelitSettings, not_without: bool) ->
     except CaptureError as error:
         if not_without:
             raise
-        typer.echo(f"warning: {error}; whoever is in it is lit as a mean head would be", err=True)
+        typer.echo(f"warning: {error}; whoever is in it is lit as an average head would be", err=True)
         return None
     for warning in captured.warnings:
         typer.echo(f"warning: {warning}", err=True)

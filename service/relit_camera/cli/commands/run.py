@@ -16,7 +16,7 @@ def run(
     context: typer.Context,
     source: Annotated[str | None, typer.Option(help="webcam, a camera's id, a video or picture file, pattern.")] = None,
     sink: Annotated[str | None, typer.Option(help="camera, pipewire, a video file, or null.")] = None,
-    subject: Annotated[str | None, typer.Option(help="A stored subject's name, or a .relit file.")] = None,
+    subject: Annotated[str | None, typer.Option(help="A stored subject's name, a .relit file, or anyone.")] = None,
     instant: Annotated[
         bool, typer.Option("--instant", help="Measure the face before the webcam first, for three seconds.")
     ] = False,

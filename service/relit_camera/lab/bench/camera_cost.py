@@ -133,7 +133,7 @@ def bundled_settings(settings: RelitSettings) -> RelitSettings:
     """The settings with the demonstration's clip, subject and look as source, subject and look."""
     changed = {
         "source": settings.source.model_copy(update={"source": str(demo_files.CLIP)}),
-        "subject": settings.subject or str(demo_files.SUBJECT),
+        "subject": settings.named_subject or str(demo_files.SUBJECT),
         "tracker": settings.tracker.model_copy(update={"name": demo_files.tracker_of_clip()}),
         "matte": demo_files.matte_of_clip(),
     }

@@ -61,6 +61,7 @@ class Publisher:
             not put again.
         placeholder: uint8 sRGB RGB (height, width, 3), of the sink's size; see `show_placeholder`.
         superseded_index: pictures of frames up to this index are not shown once the placeholder is.
+        hidden_index: pictures of frames up to this index are not shown any more.
         hold: while true, the last picture is repeated however old it is.
     """
 
@@ -91,7 +92,7 @@ class Publisher:
         self.pictures: NewestSlot[PublishedPicture] = NewestSlot(clock)
         self.shown: NewestSlot[DisplayImage] = NewestSlot(clock)
         self.placeholder = placeholder
-        self.superseded_index = -1
+        self.superseded_index = self.hidden_index = -1
         self.hold = False
         self._sink = sink
         self._fps = fps
@@ -125,13 +126,16 @@ class Publisher:
             self._tick(picture, now)
             pacer.advance(clock.now(), None if picture is None else now - self._newest.put_at)
 
-    def show_placeholder(self, placeholder: DisplayImage, last_index: int) -> None:
+    def show_placeholder(self, placeholder: DisplayImage, last_index: int, at_once: bool = False) -> None:
         """Replace the placeholder; frame `last_index` was the last one for now. May be called from any thread.
 
-        Pictures of frames up to that one may still come: they are shown only until the placeholder is.
+        Pictures of frames up to that one may still come: they are shown only until the placeholder is, which is when
+        they are too old, or `at_once`.
         """
         self.superseded_index = last_index  # set first, so that no late picture follows the placeholder
         self.placeholder = placeholder
+        if at_once:
+            self.hidden_index = last_index
 
     def stop(self) -> bool:
         """End publishing. Returns whether the thread ended within `STOP_TIMEOUT_S`: it does unless the sink hangs."""
@@ -214,7 +218,7 @@ class Publisher:
 
     def _image(self, now: float) -> DisplayImage:
         last = self._last
-        if last is not None and last.unlit and not self._unlit_allowed():
+        if last is not None and (last.frame_index <= self.hidden_index or (last.unlit and not self._unlit_allowed())):
             last = self._last = None  # not even one that is held
         if self.hold or now - self._ticked_at > 1 / self._fps + LATE_TICK_S:
             self._held_at = now

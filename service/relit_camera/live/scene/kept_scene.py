@@ -1,5 +1,6 @@
 """The first scene of a run: what the settings say, then what the last run showed or a preset, then the command line.
 
+Where none of them names anybody it is whoever comes; but who chose to be nobody stays so until somebody is chosen.
 While the camera runs its look and subject are written to a file, at most once a second.
 """
 
@@ -10,7 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from relit_camera.base.config.look import EnvironmentBackground, Look, SettingsModel, merge_edits
+from relit_camera.base.config.look import ANYONE, EnvironmentBackground, Look, SettingsModel, merge_edits
 from relit_camera.base.config.preset_store import PresetStore
 from relit_camera.base.config.settings import RelitSettings, StorageSettings
 from relit_camera.base.errors import NotReadyError, RelitError
@@ -18,7 +19,6 @@ from relit_camera.base.safe_yaml import MAX_YAML_BYTES, parse_yaml, yaml_text
 from relit_camera.base.storage.atomic_files import make_folder, write_atomic
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.scene.scene_controller import ChosenSubject, SceneController
-from relit_camera.subject.subject import ANYONE
 
 log = logging.getLogger(__name__)
 
@@ -55,7 +55,10 @@ def kept_scene_path(storage: StorageSettings) -> Path:
 
 
 def read_kept_scene(path: Path) -> KeptScene | None:
-    """What the last run kept; None where there is no such file, or a damaged one, which the log names."""
+    """What the last run kept; None where there is no such file.
+
+    A damaged one, which the log names, has the defaults, and nobody: that may have been chosen.
+    """
     try:
         if path.stat().st_size > MAX_YAML_BYTES:
             raise ValueError(f"it is larger than {MAX_YAML_BYTES >> 20} MiB")
@@ -64,7 +67,7 @@ def read_kept_scene(path: Path) -> KeptScene | None:
         return None
     except (OSError, ValueError) as error:
         log.warning("the last run's look is not shown, since %s cannot be read: %s", path.name, error)
-        return None
+        return KeptScene(look=Look(), subject=None)
 
 
 def show_first_scene(
@@ -112,6 +115,9 @@ def show_first_scene(
     scene_controller.mark_start()
     if given is not None:
         _show_kept(scene_controller, settings, environment, instant, given)
+    scene = scene_controller.scene
+    if scene.subject_name == ANYONE and not scene.shows_nobody:
+        log.info("whoever comes is relit; to hide them choose Nobody in the panel, or write 'subject: null'")
 
 
 def _show_kept(
@@ -129,7 +135,7 @@ def _show_kept(
             # A default that another version changed is no edit: whoever chose portrait stays hidden behind it.
             before = before.model_copy(update={"mode": settings.look.mode})
         look = merge_edits(kept.look, before=before, after=settings.look)
-        if "subject" in kept.model_fields_set and settings.subject == kept.configured_subject:
+        if "subject" in kept.model_fields_set and not _is_edited(settings, kept):
             subject = ChosenSubject(kept.subject)
     presets = PresetStore(settings.storage.presets)
     try:
@@ -146,8 +152,13 @@ def _show_kept(
         look = _in_environment(look, environment)
     if instant or given.subject:
         subject = None
-    elif subject is not None:
-        _show_or_say(scene_controller, None, subject)
+    elif (
+        subject is not None
+        and not _show_or_say(scene_controller, None, subject)
+        and scene_controller.scene.subject_name == ANYONE
+    ):
+        # Who chose to be shown as a captured face did not choose the live picture.
+        scene_controller.change(subject=ChosenSubject(None), recorded=False)
     if not _show_or_say(scene_controller, look, None):
         places = {"background": settings.look.background}
         _show_or_say(
@@ -155,6 +166,13 @@ def _show_kept(
             _in_environment(look.model_copy(update=places), scene_controller.scene.look.lighting.environment),
             None,
         )
+
+
+def _is_edited(settings: RelitSettings, kept: KeptScene) -> bool:
+    """Whether the configuration names a subject otherwise than it did in the last run."""
+    if "subject" not in settings.model_fields_set and None in (kept.subject, kept.configured_subject):
+        return False  # a line that is gone, or a default that another version changed, shows nobody who was hidden
+    return settings.subject != kept.configured_subject
 
 
 def _show_or_say(scene_controller: SceneController, look: Look | None, subject: ChosenSubject | None) -> bool:

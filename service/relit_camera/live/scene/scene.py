@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from relit_camera.base.config.look import Look, Mode
+from relit_camera.base.config.look import ANYONE, Look, Mode
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.light.environments.environment_panorama import Environment
-from relit_camera.subject.subject import ANYONE, Subject
+from relit_camera.subject.subject import Subject
 
 
 @dataclass(frozen=True)
@@ -46,3 +46,7 @@ class Scene:
     def shows_nobody(self) -> bool:
         """Whether nobody is relit: a placeholder is shown, or the picture as filmed where that is allowed."""
         return self.subject is None and not (self.subject_name == ANYONE and self.look.mode is Mode.LIVE)
+
+    def has_same_subject(self, other: Scene) -> bool:
+        """Whether the same one is chosen in both, perhaps under another name."""
+        return self.subject is other.subject and (self.subject is not None or self.subject_name == other.subject_name)

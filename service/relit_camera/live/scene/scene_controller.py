@@ -9,6 +9,7 @@ from pathlib import Path
 
 from relit_camera.base.concurrency.clock import SYSTEM_CLOCK, Clock
 from relit_camera.base.config.look import (
+    ANYONE,
     LEAST_RELIT_BLEND,
     Look,
     Mode,
@@ -27,7 +28,7 @@ from relit_camera.live.scene.loading_changes import Loaded, load_and_change
 from relit_camera.live.scene.look_loader import LookLoader
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.scene.scene_history import SceneHistory, ScenePoint, TakeStep
-from relit_camera.subject.subject import ANYONE, Subject
+from relit_camera.subject.subject import Subject
 from relit_camera.subject.subject_store import SubjectStore
 
 
@@ -271,7 +272,8 @@ class SceneController:
         """
 
         def made(loaded: Loaded) -> Scene:
-            name = self._first.subject_name or self.scene.subject_name
+            named = self._first.subject_name
+            name = self.scene.subject_name if named in (None, ANYONE) else named
             first = self._restored(replace(self._first, subject_name=name), loaded)
             self._history.note(_point(self.scene), _point(first), own_step=True)
             return self._show(replace(first, frozen=False))

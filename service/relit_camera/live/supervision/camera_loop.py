@@ -117,9 +117,9 @@ class CameraLoop:
             self._fallback.forget()
         if scene.shows_nobody and not scene.unlit_allowed:
             if self._is_capturing():
-                self._show(self._placeholders.capturing, CameraState.CAPTURING)
+                self._show(self._placeholders.capturing, CameraState.CAPTURING, at_once=True)
             else:
-                self._show(self._placeholders.no_subject, CameraState.NO_SUBJECT)
+                self._show(self._placeholders.no_subject, CameraState.NO_SUBJECT, at_once=True)
             return
         if self._supervisor.submit_frame(frame):
             self._fallback.release(frame.captured_at)
@@ -162,9 +162,9 @@ class CameraLoop:
         codes = DegradationCode.PICTURE_FAILED, DegradationCode.MODELS_MISSING
         return any(map(self._board.is_degraded, codes))
 
-    def _show(self, placeholder: Placeholder, state: CameraState) -> None:
+    def _show(self, placeholder: Placeholder, state: CameraState, at_once: bool = False) -> None:
         self._fallback.forget()
-        self._publisher.show_placeholder(placeholder.image, self._last_index)
+        self._publisher.show_placeholder(placeholder.image, self._last_index, at_once)
         self._board.set_state(state)
 
     def _count(self, frame: Frame) -> None:
@@ -193,7 +193,7 @@ def publish_if_current(publisher: Publisher, scene: Callable[[], Scene], frame: 
     picture may be private by now, nor may a held picture change.
     """
     now, then = scene(), rendered.scene
-    if now.frozen or now.subject is not then.subject or now.look.mode is not then.look.mode:
+    if now.frozen or not now.has_same_subject(then) or now.look.mode is not then.look.mode:
         return False
     if rendered.unlit and not now.unlit_allowed:
         return False

@@ -151,7 +151,7 @@ class FallbackRenderer:
     def _may_hold(self, now: float, scene: Scene) -> bool:
         """Whether the last picture may stay: it is no older, and of the mode and the subject that are chosen now."""
         last, since = self._last_scene, self._failing_since
-        same = last is None or (last.look.mode is scene.look.mode and last.subject is scene.subject)
+        same = last is None or (last.look.mode is scene.look.mode and last.has_same_subject(scene))
         return same and since is not None and now - since < self._hold_s
 
     def _at_rest(self, frame: Frame, scene: Scene) -> DisplayImage | None:

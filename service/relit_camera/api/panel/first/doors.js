@@ -3,7 +3,7 @@
 import { call, toast } from "../api.js";
 import { store } from "../library/stored.js";
 import { on } from "../stage/events.js";
-import { onScene, scene } from "../stage/scene.js";
+import { ANYONE, onScene, scene, showsNobody } from "../stage/scene.js";
 import { comesBack, showUnlit } from "../stage/unlit.js";
 import { make } from "../widgets.js";
 import { DRAWINGS } from "./drawings.js";
@@ -29,6 +29,7 @@ section.innerHTML = `
   <input type="file" id="door-file-input" accept=".relit" hidden>
   <p id="doors-state" class="hint" role="status"></p>
   <p class="buttons">
+    <button type="button" class="quiet" id="door-anyone">Relight my live picture</button>
     <button type="button" class="quiet" id="door-unlit">Show me unlit…</button>
     <button type="button" class="quiet" id="doors-close" hidden>Close</button>
   </p>`;
@@ -65,7 +66,7 @@ export async function captureFace() {
 
 function draw() {
   const now = scene();
-  const nobody = now !== null && now.subject === null && !now.unlit_allowed && !comesBack();
+  const nobody = now !== null && showsNobody(now) && !now.unlit_allowed && !comesBack();
   const shown = now !== null && (nobody || opened);
   if (section.hidden === !shown) return;
   const inside = section.contains(document.activeElement);
@@ -74,10 +75,16 @@ function draw() {
 }
 
 function drawNow(now) {
-  byId("doors-close").hidden = now.subject === null && !now.unlit_allowed;
-  if (now.subject !== null) byId("doors-now").textContent = `Others see “${now.subject}” now.`;
-  else if (now.unlit_allowed) byId("doors-now").textContent = "Others see your webcam’s picture, unlit.";
-  else byId("doors-now").textContent = "So far others see a placeholder. Your pictures stay on this computer.";
+  byId("doors-close").hidden = showsNobody(now) && !now.unlit_allowed;
+  byId("door-anyone").hidden = now.subject === ANYONE && now.mode === "live";
+  byId("doors-now").textContent = whoIsSeen(now);
+}
+
+function whoIsSeen(now) {
+  if (!showsNobody(now)) return now.subject === ANYONE ? "Others see you, lit as an average head would be." : `Others see “${now.subject}” now.`;
+  if (now.unlit_allowed) return "Others see your webcam’s picture, unlit.";
+  if (now.subject === ANYONE) return "Portrait moves a picture of you, and there is none yet. Others see a placeholder.";
+  return "So far others see a placeholder. Your pictures stay on this computer.";
 }
 
 /** The doors have done their work. */
@@ -165,6 +172,7 @@ byId("door-file-input").onchange = ({ target }) => {
   target.value = "";
   if (file) pass(() => openFile(file), `Uploading ${file.name}…`);
 };
+byId("door-anyone").onclick = () => pass(() => call("PATCH", "scene", { subject: ANYONE, mode: "live", unlit_allowed: false }), "");
 byId("door-unlit").onclick = askUnlit;
 byId("doors-close").onclick = leave;
 section.addEventListener("keydown", (event) => {

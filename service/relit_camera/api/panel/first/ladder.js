@@ -3,7 +3,7 @@
 
 import { call, toast } from "../api.js";
 import { on } from "../stage/events.js";
-import { onScene, scene } from "../stage/scene.js";
+import { ANYONE, onScene, scene, showsNobody } from "../stage/scene.js";
 import { make, setText } from "../widgets.js";
 import { captureFace, openDoors } from "./doors.js";
 
@@ -24,6 +24,11 @@ const RUNGS = {
   pictures: { line: "captured under one light at a time", trust: "Right where there was light, modelled elsewhere." },
 };
 const OLD = { line: "captured by an older version, which did not note how", trust: "" };
+const MEAN_HEAD = {
+  line: "You are lit as an average head would be.",
+  trust: "Nothing was captured of you. With a subject of your own, light and shadow fit your face, hair and clothes.",
+  next: RUNGS.desk.next,
+};
 const DEMO = {
   line: "rendered, they do not exist",
   trust: "Right in any light. From ICT-FaceKit (MIT) and a head scan by Lee Perry-Smith (CC-BY 3.0).",
@@ -43,28 +48,29 @@ let named = null;
 let known = "";
 
 function show(now) {
-  const key = `${now.subject}|${now.rung}`;
+  const name = showsNobody(now) ? null : now.subject;
+  const key = `${name}|${now.rung}`;
   if (key === known) return;
   known = key;
-  const rung = now.subject === DEMO_NAME ? DEMO : (RUNGS[now.rung] ?? OLD);
-  line.textContent = now.subject === null ? "" : `“${now.subject}”: ${rung.line}.`;
-  trust.textContent = now.subject === null ? "" : rung.trust;
-  if (now.subject !== named) stills.hidden = true; // else a button would vanish under somebody's hand
-  named = now.subject;
-  if (now.subject !== null) tellDetails(now, rung);
+  const rung = { [DEMO_NAME]: DEMO, [ANYONE]: MEAN_HEAD }[name] ?? RUNGS[now.rung] ?? OLD;
+  if (rung === MEAN_HEAD) line.textContent = rung.line;
+  else line.textContent = name === null ? "" : `“${name}”: ${rung.line}.`;
+  trust.textContent = name === null ? "" : rung.trust;
+  if (name !== named) stills.hidden = true; // else a button would vanish under somebody's hand
+  named = name;
+  if (name !== null && rung !== MEAN_HEAD) tellDetails(now, rung);
   const focused = ladder.contains(document.activeElement) ? document.activeElement.id : null;
-  next.replaceChildren(nextRung(now, rung), stills, people());
+  next.replaceChildren(...nextRungs(name, rung), stills, people());
   if (focused) document.getElementById(focused)?.focus();
 }
 
-/** The way to the next rung: a page, or the capture of one's own face. */
-function nextRung(now, rung) {
-  if (now.subject !== null && rung !== DEMO && rung !== OLD) {
-    return rung.next ? make("a", { id: "ladder-next", className: "button", href: rung.next[1] }, rung.next[0]) : "";
-  }
-  const button = make("button", { type: "button", id: "ladder-next" }, "My face now");
+/** The ways to the next rung: a page, or the capture of one's own face. */
+function nextRungs(name, rung) {
+  const page = rung.next ? [make("a", { id: "ladder-next", className: "button", href: rung.next[1] }, rung.next[0])] : [];
+  if (name !== null && ![DEMO, OLD, MEAN_HEAD].includes(rung)) return page;
+  const button = make("button", { type: "button", id: "ladder-face" }, rung === MEAN_HEAD ? "Make this my subject" : "My face now");
   button.onclick = captureFace;
-  return button;
+  return [button, ...page];
 }
 
 /** Says, as the light changes, where most of it is a guess for this face, and that it is shown softer than it is. */

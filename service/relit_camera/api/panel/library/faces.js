@@ -4,7 +4,7 @@ import { attempt } from "../api.js";
 import { askUnlit } from "../first/doors.js";
 import { loadPicture } from "../pictures.js";
 import { on } from "../stage/events.js";
-import { change, onScene, scene, settled } from "../stage/scene.js";
+import { ANYONE, change, onScene, scene, settled, showsNobody } from "../stage/scene.js";
 import { hideUnlit } from "../stage/unlit.js";
 import { ask, choose, focusItem, keyed, setAttribute, setText, tile } from "../widgets.js";
 import { menuButton, menuEntry } from "./menu.js";
@@ -15,6 +15,8 @@ const MODE_HINTS = {
   portrait: "Your captured picture, relit, moves as you move: nothing of your room, or of today’s hair and clothes, is sent.",
 };
 const UNLIT_HINT = "The webcam’s picture is shown to others as it is.";
+const NO_PORTRAIT_HINT = "Portrait moves a picture of you, and there is none yet: others see a still placeholder.";
+const ANYONE_HINT = "Whoever sits here, lit as an average head would be.";
 const HIDDEN_HINT = "Nobody is shown: others see a still placeholder.";
 
 const list = document.getElementById("faces");
@@ -25,6 +27,7 @@ let version = 0;
 
 // Whoever is relit again is not to be shown as filmed later, when the face is lost.
 const show = (name) => change({ subject: name, unlit_allowed: false });
+const showAnyone = () => change({ subject: ANYONE, mode: "live", unlit_allowed: false });
 
 async function remove(name) {
   const shown = scene()?.subject === name;
@@ -37,6 +40,7 @@ async function remove(name) {
 
 function face({ name, own, thumbnail }) {
   if (name === null) return tile({ name: "Nobody", title: HIDDEN_HINT, symbol: "∅", onChoose: () => show(null) });
+  if (name === ANYONE) return tile({ name: "Anyone", title: ANYONE_HINT, symbol: "◐", onChoose: showAnyone });
   const menu = menuButton(`Options of ${name}`,
     menuEntry("Rename", async () => focusItem(list, await rename("subjects", name))),
     menuEntry("Delete", () => remove(name)));
@@ -49,10 +53,11 @@ function draw() {
   const now = scene();
   if (!now) return;
   const faces = stored("subjects").map(({ name, temporary, thumbnail }) => ({ name, own: !temporary, thumbnail }));
-  const items = [...faces, { name: null }].map((item) => ({ ...item, chosen: item.name === now.subject && !now.unlit_allowed }));
+  const items = [...faces, { name: ANYONE }, { name: null }].map((item) => ({ ...item, chosen: item.name === now.subject && !now.unlit_allowed }));
   keyed(list, items, ({ name }) => name ?? "", face);
   choose(document.getElementById("mode"), now.mode);
-  const hint = now.subject ? MODE_HINTS[now.mode] : HIDDEN_HINT;
+  const hidden = now.subject === ANYONE ? NO_PORTRAIT_HINT : HIDDEN_HINT;
+  const hint = showsNobody(now) ? hidden : MODE_HINTS[now.mode];
   setText(document.getElementById("mode-hint"), unlit ? UNLIT_HINT : hint);
   setAttribute(allow, "aria-pressed", now.unlit_allowed);
 }

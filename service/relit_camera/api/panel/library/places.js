@@ -4,7 +4,7 @@
 import { KEY_LIGHT } from "../light/lamps.js";
 import { UNTURNED, standingLook } from "../light/looks.js";
 import { forgetWaiting, loadPicture } from "../pictures.js";
-import { change, onScene, scene } from "../stage/scene.js";
+import { ANYONE, change, onScene, scene } from "../stage/scene.js";
 import { on } from "../stage/events.js";
 import { keyed, tile } from "../widgets.js";
 import { backgroundToMatch, keepsBackground } from "./background.js";
@@ -81,8 +81,9 @@ function drawFaces() {
 
 onScene((now) => {
   draw();
-  if (now.subject === subject) return;
-  subject = now.subject;
+  const own = now.subject === ANYONE ? null : now.subject;
+  if (own === subject) return;
+  subject = own;
   drawFaces();
 });
 onStored((collection) => {

@@ -3,6 +3,9 @@
 import { Latest, attempt, request } from "../api.js";
 import { on } from "./events.js";
 
+/** The subject that is whoever comes. */
+export const ANYONE = "anyone";
+
 const listeners = [];
 let told = null;
 let unsettled = null;
@@ -10,6 +13,11 @@ let unsettled = null;
 /** The scene, or null before the camera has told it. */
 export function scene() {
   return told && unsettled ? joined(told, unsettled) : told;
+}
+
+/** Whether a scene shows nobody: whoever comes has no picture that could be moved. */
+export function showsNobody({ subject, mode }) {
+  return subject === null || (subject === ANYONE && mode === "portrait");
 }
 
 /** Calls `callback(scene)` now, if there is one, and after each change, whoever made it. */
