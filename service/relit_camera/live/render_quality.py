@@ -30,9 +30,9 @@ class RenderQuality:
 FULL_QUALITY = RenderQuality()
 """Of a replay, which has time."""
 QUALITY_LEVELS = (
-    RenderQuality(live_track_every=2, matte_every=2),
-    RenderQuality(relight_every=4, live_track_every=2, matte_every=2),
-    RenderQuality(relight_every=4, half_size=True, live_track_every=2, matte_every=2),
+    RenderQuality(live_track_every=2, matte_every=3),
+    RenderQuality(relight_every=4, live_track_every=2, matte_every=3),
+    RenderQuality(relight_every=4, half_size=True, live_track_every=2, matte_every=3),
     RenderQuality(relight_every=4, half_size=True, track_every=2, live_track_every=3, matte_every=3),
     RenderQuality(relight_every=4, half_size=True, track_every=2, live_track_every=3, matte_every=3, render_every=2),
 )

@@ -8,7 +8,7 @@ import pytest
 from relit_camera.base.images.color import uint8_from_linear
 from relit_camera.capture.instant.anyone import anyone
 from relit_camera.face.skin_prior import skin_of_luminance
-from relit_camera.live.modes.skin_tint import INTERVAL_S, TIME_CONSTANT_S, SkinTint
+from relit_camera.live.modes.face_lighting import LOOK_S, TINT_S, SkinTint
 from tests.live.people import face_of
 
 LIGHT = 0.7
@@ -49,9 +49,9 @@ def test_it_is_eased_and_the_first_look_counts_at_once() -> None:
     before = factor(made, 0.4)
     assert before == pytest.approx(factor(tint(), 0.4))
     goal = factor(tint(), 0.06)
-    soon, late = factor(made, 0.06, INTERVAL_S), 0.0
-    for step in range(2, int(5 * TIME_CONSTANT_S / INTERVAL_S)):
-        late = factor(made, 0.06, step * INTERVAL_S)
+    soon, late = factor(made, 0.06, LOOK_S), 0.0
+    for step in range(2, int(5 * TINT_S / LOOK_S)):
+        late = factor(made, 0.06, step * LOOK_S)
     assert abs(np.log(soon / before)) < 0.2 * abs(np.log(goal / before))
     assert late == pytest.approx(goal, rel=0.05)
 

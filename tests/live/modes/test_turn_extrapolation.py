@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from relit_camera.base.rotations import Rotation, rotation_from_angles
-from relit_camera.live.modes.turn_extrapolation import TurnExtrapolation
+from relit_camera.live.modes.scene_relighting import TurnExtrapolation
 
 LIGHT, ROOM = object(), object()
 NORMALS = np.random.default_rng(0).normal(size=(64, 3))

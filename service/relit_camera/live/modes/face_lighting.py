@@ -1,22 +1,30 @@
-"""What is known of the light on one live face, from frame to frame."""
+"""What is known of the light on one live face, from frame to frame.
+
+Of somebody who is lit as the head that is nobody's (`capture.instant.anyone`) the room's light is estimated in their
+own color and brightness: what their skin takes from the light counts as the room's. The relit picture is corrected by
+what their skin is taken for (`face.skin_prior`), told by live frames.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.base.images.image_types import Frame
+from relit_camera.base.images.color import linear_from_uint8, luminance
+from relit_camera.base.images.image_types import DisplayImage, Frame
 from relit_camera.base.rotations import Rotation
 from relit_camera.face.face_state import FaceStatus
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.face.motion.motion_blending import EasedPresence
+from relit_camera.face.skin_prior import estimate_skin
 from relit_camera.live.modes.frame_relighting import FacePlan
 from relit_camera.live.modes.ratio_relighting import FaceLight, RatioRelighting
 from relit_camera.live.modes.room_light_estimator import RoomLightEstimate, RoomLightEstimator
 from relit_camera.live.modes.scene_relighting import SceneRelighting
-from relit_camera.live.modes.skin_tint import SkinTint
+from relit_camera.live.modes.source_masks import inside_face
 from relit_camera.live.reenactment.source_image import SourceFace
 from relit_camera.live.render_quality import RenderQuality
 from relit_camera.live.scene.scene import Scene
@@ -27,6 +35,12 @@ MOST_TURN_DEG, RETURN_TURN_DEG = 60.0, 54.0
 """Angle between nose and camera from which landmarks are a guess, and below which they are believed again."""
 EASE_S = 0.5
 """Seconds over which the light of a face that comes or goes is eased to that of a person whose face is not seen."""
+
+LOOK_S, TINT_S = 0.25, 2.0
+"""Time between two looks, and over which they are averaged, in logarithms."""
+LEAST_SAMPLES = 50
+THUMBNAIL = (32, 18)
+"""Size of the picture of which the mean luminance is taken."""
 
 
 @dataclass(frozen=True)
@@ -130,3 +144,32 @@ class FaceLighting:
         pose = None if motion.status is FaceStatus.LOST else motion.pose
         self._followed = pose is not None and pose.turn_deg <= limit
         return self._followed
+
+
+class SkinTint:
+    """The factor by which a person's skin is brighter than that of one subject. Not thread-safe."""
+
+    def __init__(self, subject: Subject, face: SourceFace) -> None:
+        """`face` is that of the subject, which must keep its albedo."""
+        assert subject.albedo is not None
+        self._skin = np.median(subject.albedo[inside_face(face) > 0.9].astype(np.float32), axis=0)
+        self._logarithm: NDArray[np.float64] | None = None
+        self._looked_s = -np.inf
+
+    def update(self, image: DisplayImage, skin: NDArray[np.float32], time_s: float) -> NDArray[np.float32]:
+        """The factor (3,) after a live frame.
+
+        Args:
+            image: the whole frame, uint8 sRGB.
+            skin: (count, 3) linear values of the face in it; few or none where it is hidden or overexposed.
+            time_s: of the frame.
+        """
+        passed = time_s - self._looked_s
+        if len(skin) >= LEAST_SAMPLES and not 0 <= passed < LOOK_S:
+            small = np.asarray(cv2.resize(image, THUMBNAIL, interpolation=cv2.INTER_AREA), np.uint8)
+            seen = estimate_skin(skin, float(luminance(linear_from_uint8(small)).mean()))
+            found = np.log(seen / np.maximum(self._skin, 1e-3))
+            share = 1.0 if self._logarithm is None or passed < 0 else 1 - np.exp(-passed / TINT_S)
+            before = found if self._logarithm is None else self._logarithm
+            self._logarithm, self._looked_s = before + share * (found - before), time_s
+        return np.ones(3, np.float32) if self._logarithm is None else np.exp(self._logarithm).astype(np.float32)

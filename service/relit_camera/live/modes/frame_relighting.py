@@ -7,12 +7,13 @@ their light the mean factor of a person takes its place.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.images.color import linear_from_uint8
 from relit_camera.base.images.image_types import DisplayImage, Frame
 from relit_camera.base.images.light_multiplication import POWER, light_of_root, multiply_light, root_of_light
 from relit_camera.base.images.temporal_noise import TemporalNoiseFilter
@@ -30,6 +31,11 @@ skin, whose own color is a guess, and on a grey sweater an error is seen as gree
 SKIN_HUE, REDDER = 0.25, 0.35
 """Distance of logarithms of colors from the face's within which a cell is skin as well, and what counts of it toward
 red: ears are redder, and what is red is not seen to be off."""
+
+HUE_REDUCTION = 2
+"""What is skin is told for fewer cells, by a factor on each side."""
+_LOGARITHMS = np.log(np.maximum(linear_from_uint8(np.arange(256, dtype=np.uint8)), np.float32(1e-3)))
+"""Of the light of each code; darker ones than ten hardly tell a color."""
 
 
 @dataclass(frozen=True)
@@ -126,8 +132,8 @@ class FrameRelighting:
         """
         image, step = plan.frame.image, cell_side(plan.frame.size)
         rows, columns = (-(-side // step) for side in image.shape[:2])
-        rest = root_of_light(plan.rest[None])[0]
-        factor = np.broadcast_to(rest, (rows, columns, 3)).astype(np.float32)
+        factor = np.empty((rows, columns, 3), np.float32)
+        factor[:] = root_of_light(plan.rest[None])[0]
         added, person = np.zeros_like(factor), None
         if plan.faces:
             boxes = [face.relighting.box(face.light) if blend >= 1 else (0, 0, columns, rows) for face in plan.faces]
@@ -136,7 +142,7 @@ class FrameRelighting:
             told = [face.relighting.cells(image, face.light, box) for face, box in zip(plan.faces, boxes, strict=True)]
             shares = [face.presence for face in plan.faces]
             factor, added = _combined(image, step, factor, told, shares)
-            factor *= _cast_kept(image, step, plan.faces, told)
+            _keep_cast(factor, image, plan.faces, told)
             if plan.first is not None:
                 left, top, right, bottom = boxes[0]
                 person = np.zeros((rows, columns), np.float32)
@@ -160,58 +166,76 @@ def _combined(
         shares: presence of each.
     """
     presence = max(shares)
+    parts = [_scaled(cells, share / presence) for cells, share in zip(told, shares, strict=True)]
     known = np.zeros((*rest.shape[:2], 4), np.float32)
-    for cells, share in zip(told, shares, strict=True):
-        left, top, right, bottom = cells.box
-        known[top:bottom, left:right] += cells.ratio * np.float32(share / presence)
-    if len(told) > 1:
+    for cells in parts:
+        inside = _inside(cells.box)
+        cv2.add(known[inside], cells.ratio, dst=known[inside])
+    if len(parts) > 1:
         known /= np.maximum(known[..., 3:], 1)  # where two persons are side by side
     factor, added = extrapolate_roots(known), np.zeros_like(rest)
-    for cells, share in zip(told, shares, strict=True):
-        left, top, right, bottom = cells.box
-        inside = np.s_[top:bottom, left:right]
-        trust = 1 - (1 - cells.trust) * np.float32(share / presence)
-        trust = cv2.cvtColor(np.asarray(trust, np.float32), cv2.COLOR_GRAY2RGB)
-        added[inside] *= trust
-        added[inside] += cv2.multiply(cells.source.relit, 1 - trust)
-        factor[inside] *= trust
-        noise = noise_fraction(image, step, cells.box, factor[inside], cells.source, cells.unit)
-        calm = cv2.multiply(factor[inside], cv2.cvtColor(noise, cv2.COLOR_GRAY2RGB))
-        factor[inside] -= calm
-        added[inside] += cv2.multiply(calm, cells.smooth)
-    factor = np.asarray(cv2.addWeighted(factor, presence, rest, 1 - presence, 0), np.float32)
-    return factor, np.asarray(added * np.float32(presence), np.float32)
+    for index, cells in enumerate(parts):
+        inside = _inside(cells.box)
+        trust = cv2.merge([cells.trust] * 3)
+        more = cv2.multiply(cells.source.relit, 1 - trust)
+        if index > 0:
+            more += added[inside] * trust
+        told_here = cv2.multiply(factor[inside], trust)
+        noise = noise_fraction(image, step, cells.box, np.asarray(told_here, np.float32), cells.source, cells.unit)
+        calm = cv2.multiply(told_here, cv2.merge([noise] * 3))
+        cv2.subtract(told_here, calm, dst=factor[inside])
+        cv2.add(more, cv2.multiply(calm, cells.smooth), dst=added[inside])
+    if presence < 1:
+        factor = np.asarray(cv2.addWeighted(factor, presence, rest, 1 - presence, 0), np.float32)
+        added *= np.float32(presence)
+    return factor, added
 
 
-def _cast_kept(
-    image: DisplayImage, step: int, faces: tuple[FacePlan, ...], told: list[FaceCells]
-) -> NDArray[np.float32]:
-    """Roots of the color of the room's light that cells keep, (rows, columns, 3): 1 on skin."""
-    rows, columns = (-(-side // step) for side in image.shape[:2])
-    live, _ = live_cells(image, step, (0, 0, columns, rows))
-    hue = _hue(live)
-    skin = np.zeros((rows, columns), np.float32)
+def _scaled(cells: FaceCells, share: float) -> FaceCells:
+    """What a face tells that is there by a share only."""
+    if share >= 1:
+        return cells
+    part = np.float32(share)
+    return replace(cells, ratio=cells.ratio * part, trust=1 - (1 - cells.trust) * part)
+
+
+def _inside(box: Box) -> tuple[slice, slice]:
+    left, top, right, bottom = box
+    return np.s_[top:bottom, left:right]
+
+
+def _keep_cast(
+    factor: NDArray[np.float32], image: DisplayImage, faces: tuple[FacePlan, ...], told: list[FaceCells]
+) -> None:
+    """Give what is no skin back some of the color of the room's light, in roots of factors (rows, columns, 3)."""
+    rows, columns = factor.shape[:2]
+    small = (-(-columns // HUE_REDUCTION), -(-rows // HUE_REDUCTION))
+    logarithms = cv2.split(cv2.LUT(cv2.resize(image, small, interpolation=cv2.INTER_LINEAR), _LOGARITHMS))
+    hue = [cv2.subtract(logarithms[channel], logarithms[1]) for channel in (0, 2)]
+    skin = np.zeros(small[::-1], np.float32)
     for cells in told:
-        left, top, right, bottom = cells.box
+        left, top, right, bottom = (side // HUE_REDUCTION for side in cells.box)
         inside = np.s_[top:bottom, left:right]
-        on_face = cells.source.face * cells.source.confidence
-        seen = on_face * cells.source.skin > 0.5
+        if right <= left or bottom <= top:
+            continue
+        shown = cv2.multiply(cells.source.face, cells.source.confidence)
+        on_face, skin_there = (
+            cv2.resize(each, (right - left, bottom - top), interpolation=cv2.INTER_LINEAR)
+            for each in (shown, cells.source.skin)
+        )
+        seen = on_face * skin_there > 0.5
         if not seen.any():
             continue
-        away = hue - np.median(hue[inside][seen], axis=0)
-        away[..., 0] *= np.where(away[..., 0] > 0, np.float32(REDDER), 1)
-        skin = np.maximum(skin, np.exp(-np.einsum("rci,rci->rc", away, away) / SKIN_HUE**2))
-        skin[inside] = np.maximum(skin[inside], on_face)
+        red, blue = (each - np.median(each[inside][seen]) for each in hue)
+        red *= np.where(red > 0, np.float32(REDDER), 1)
+        near = cv2.exp((red * red + blue * blue) * np.float32(-1 / SKIN_HUE**2))
+        near[inside] = np.maximum(near[inside], on_face)
+        skin = np.maximum(skin, near)
     cast = CAST_KEPT * np.mean([np.log(np.maximum(face.light.cast, 1e-3)) for face in faces], axis=0)
-    kept = np.clip(cast, -MOST_KEPT, MOST_KEPT) / POWER
-    other = 1 - cv2.GaussianBlur(skin, (0, 0), 1.0)
-    return np.asarray(np.exp(other[..., None] * kept), np.float32)
-
-
-def _hue(roots: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Logarithms (rows, columns, 2) of red and blue light over green; roots are (rows, columns, 3)."""
-    light = POWER * np.log(np.maximum(roots, np.float32(0.05)))
-    return np.asarray(light[..., ::2] - light[..., 1:2], np.float32)
+    more = np.expm1(np.clip(cast, -MOST_KEPT, MOST_KEPT) / POWER)
+    other = cv2.resize(cv2.blur(1 - skin, (3, 3)), (columns, rows), interpolation=cv2.INTER_LINEAR)
+    kept = cv2.merge([other * np.float32(each) + 1 for each in more])
+    cv2.multiply(factor, kept, dst=factor)
 
 
 def _pixels_of(cells: Box, step: int, size: tuple[int, int]) -> Box:

@@ -88,10 +88,8 @@ class LiveMode:
         context, lighting, live = self._context, scene.look.lighting, plan.frame
         with context.timer.stage("move"):
             relit = self._frames.apply(plan, lighting.blend)
-        with context.timer.stage("compose"):
             person = None if motion.status is FaceStatus.LOST else relit.person  # who is lost is there no more
             alpha = context.compositor.person_alpha(live, scene, person, matte_every)
-        with context.timer.stage("move"):
             picture = relit.picture(None if alpha is None else bounding_box(alpha))
         with context.timer.stage("compose"):
             image = context.compositor.composite_live(picture, alpha, live, scene)

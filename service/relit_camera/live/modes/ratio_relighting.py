@@ -82,7 +82,6 @@ class FaceCells:
         ratio: (rows, columns, 4) float32, the roots of the ratio times the confidence, and the confidence.
         trust: (rows, columns) how far the live picture's detail is shown, 0..1.
         sure: (rows, columns) how surely cells show what the source image has there of the person, 0..1.
-        live: (rows, columns, 3) roots of the live picture's light.
         smooth: (rows, columns, 3) roots of the live picture's light with hardly any noise.
         source: of the source image there.
         unit: the eye distance in cells.
@@ -92,7 +91,6 @@ class FaceCells:
     ratio: Cells
     trust: Cells
     sure: Cells
-    live: Cells
     smooth: Cells
     source: SourceCells
     unit: float
@@ -210,7 +208,7 @@ class RatioRelighting:
         smooth = smoothed(live, unit)
         told = shape_cells(source) if self.subject.is_anyone else blend_cells(live, smooth, brightest, source, unit)
         sure = cv2.multiply(confidence, on_face) if self.subject.is_anyone else cv2.extractChannel(told.ratio, 3)
-        return FaceCells(box, told.ratio, told.trust, np.asarray(sure, np.float32), live, smooth, source, unit)
+        return FaceCells(box, told.ratio, told.trust, np.asarray(sure, np.float32), smooth, source, unit)
 
     def _warp(self, motion: FaceMotion, pose: HeadPose, size: tuple[int, int]) -> Warp:
         """The source image as it lies on the live face of a frame of `size`.
