@@ -29,6 +29,7 @@ class FurtherFacesTunables:
         sought_s: the same while one of them is lost.
         forgotten_s: for so long a lost one is expected where it was.
         left_s: after so long without the face that the camera is for, it takes the largest of them instead.
+        turns: one of them is looked at in one of two frames, each of several in one of so many.
     """
 
     most: int = 3
@@ -37,6 +38,7 @@ class FurtherFacesTunables:
     sought_s: float = 0.25
     forgotten_s: float = 5.0
     left_s: float = 2.0
+    turns: int = 3
 
 
 TUNABLES = FurtherFacesTunables()
@@ -62,6 +64,7 @@ class _Further:
     def track(self, frame: Frame, every: int, besides: tuple[Box, ...]) -> None:
         """Follow it into the next frame; one that is lost is not looked for here."""
         if self.is_lost:
+            self._note(frame, self._state)
             return
         self._tracker.besides = besides
         self._measured.set_interval(every, follow_lips=False)
@@ -69,11 +72,9 @@ class _Further:
         if self.is_lost:
             self._measured.reset()
 
-    def motion(self, frame: Frame) -> FaceMotion:
-        return self._follower.follow(self._state, frame.size, frame.time_s)
-
     def _note(self, frame: Frame, state: FaceState) -> None:
         self._state = state
+        self.motion = self._follower.follow(state, frame.size, frame.time_s)
         if state.visible:
             self.box, self.seen_s = bounding_box(state.landmarks), frame.time_s
 
@@ -92,16 +93,18 @@ class FurtherFaces:
         self._tracker = tracker if isinstance(tracker, LandmarkTracker) else None
         self._make_follower = make_follower
         self._faces: dict[int, _Further] = {}
-        self._count = 0
+        self._count = self._frames = 0
         self._looked_s = self._first_s = self._time_s = float("-inf")
 
     def follow(self, frame: Frame, first: FaceState, every: int) -> Mapping[int, FaceMotion]:
         """Their motion in the next frame, each under a number that it keeps. One that is lost stays for a while.
 
+        They take turns: in a frame that is not a face's turn its motion is the same object as before.
+
         Args:
             frame: the live frame.
             first: the face that the camera is for.
-            every: of so many frames they are measured in one.
+            every: of so many of its turns a face is measured in one.
         """
         if self._tracker is None:
             return {}
@@ -112,7 +115,11 @@ class FurtherFaces:
         if first.visible:
             self._first_s = frame.time_s
         taken = (bounding_box(first.landmarks),) if first.visible else ()
+        self._frames += 1
+        turns = min(len(self._faces) + 1, TUNABLES.turns)
         for number, face in self._faces.items():
+            if (self._frames + number) % turns:
+                continue
             others = (*taken, *(each.box for other, each in self._faces.items() if other != number))
             face.track(frame, every, others)
         self._drop(frame.time_s, taken)
@@ -121,7 +128,7 @@ class FurtherFaces:
         if frame.time_s - self._first_s > TUNABLES.left_s and self._faces:
             del self._faces[max(self._faces, key=lambda number: max(self._faces[number].box[2:]))]
         self._tracker.besides = tuple(face.box for face in self._faces.values() if not face.is_lost)
-        return {number: face.motion(frame) for number, face in self._faces.items()}
+        return {number: face.motion for number, face in self._faces.items()}
 
     def _drop(self, now_s: float, taken: tuple[Box, ...]) -> None:
         """Forget those that were lost for long, and those that have slid onto another face."""

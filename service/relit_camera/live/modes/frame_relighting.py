@@ -117,11 +117,15 @@ class RelitCells:
 
 
 class FrameRelighting:
-    """Relights one live frame after another. For one thread at a time."""
+    """Relights one live frame after another. For one thread at a time.
+
+    A plan of a face that is that of the last frame tells what it told there.
+    """
 
     def __init__(self) -> None:
         """Begin without a frame."""
         self._noise = TemporalNoiseFilter()
+        self._last: list[tuple[FacePlan, FaceCells]] = []
 
     def apply(self, plan: FramePlan, blend: float = 1.0) -> RelitCells:
         """The planned frame in the scene's light.
@@ -136,21 +140,28 @@ class FrameRelighting:
         factor[:] = root_of_light(plan.rest[None])[0]
         added, person = np.zeros_like(factor), None
         if plan.faces:
-            boxes = [face.relighting.box(face.light) if blend >= 1 else (0, 0, columns, rows) for face in plan.faces]
+            whole = (0, 0, columns, rows) if blend < 1 else None
             if plan.first is not None:
-                image = self._noise.filtered(image, _pixels_of(boxes[0], step, plan.frame.size))
-            told = [face.relighting.cells(image, face.light, box) for face, box in zip(plan.faces, boxes, strict=True)]
+                box = whole or plan.first.relighting.box(plan.first.light)
+                image = self._noise.filtered(image, _pixels_of(box, step, plan.frame.size))
+            known = {id(face): cells for face, cells in self._last if cells.box == (whole or cells.box)}
+            self._last = [(face, known.get(id(face)) or _told_by(face, image, whole)) for face in plan.faces]
+            told = [cells for _, cells in self._last]
             shares = [face.presence for face in plan.faces]
             factor, added = _combined(image, step, factor, told, shares)
             _keep_cast(factor, image, plan.faces, told)
             if plan.first is not None:
-                left, top, right, bottom = boxes[0]
                 person = np.zeros((rows, columns), np.float32)
-                person[top:bottom, left:right] = told[0].sure
+                person[_inside(told[0].box)] = told[0].sure
         if blend < 1:
             live, _ = live_cells(image, step, (0, 0, columns, rows))
             factor, added = blend_toward_live(factor, added, live, blend)
         return RelitCells(plan.frame.image, image, factor, added, 1 - blend, person)
+
+
+def _told_by(face: FacePlan, image: DisplayImage, box: Box | None) -> FaceCells:
+    """What a face tells of a box of cells, or where it tells anything."""
+    return face.relighting.cells(image, face.light, box or face.relighting.box(face.light))
 
 
 def _combined(
@@ -181,10 +192,12 @@ def _combined(
         if index > 0:
             more += added[inside] * trust
         told_here = cv2.multiply(factor[inside], trust)
-        noise = noise_fraction(image, step, cells.box, np.asarray(told_here, np.float32), cells.source, cells.unit)
-        calm = cv2.multiply(told_here, cv2.merge([noise] * 3))
-        cv2.subtract(told_here, calm, dst=factor[inside])
-        cv2.add(more, cv2.multiply(calm, cells.smooth), dst=added[inside])
+        if index == 0:  # others are smaller
+            noise = noise_fraction(image, step, cells.box, np.asarray(told_here, np.float32), cells.source, cells.unit)
+            calm = cv2.multiply(told_here, cv2.merge([noise] * 3))
+            told_here = cv2.subtract(told_here, calm)
+            more = cv2.add(more, cv2.multiply(calm, cells.smooth))
+        factor[inside], added[inside] = told_here, more
     if presence < 1:
         factor = np.asarray(cv2.addWeighted(factor, presence, rest, 1 - presence, 0), np.float32)
         added *= np.float32(presence)

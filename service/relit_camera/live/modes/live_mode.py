@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import partial
 
 import cv2
@@ -10,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.images.image_types import Alpha, DisplayImage, Frame
+from relit_camera.base.images.resize import MIDDLE
 from relit_camera.face.face_state import FaceStatus
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.modes.face_lighting import FaceLighting, LitAs
 from relit_camera.live.modes.frame_fitting import FaceCut, fit_frame, fit_motion
-from relit_camera.live.modes.frame_relighting import FramePlan, FrameRelighting
+from relit_camera.live.modes.frame_relighting import FacePlan, FramePlan, FrameRelighting
 from relit_camera.live.modes.mode import ModeContext, RenderedFrame, RenderTask
 from relit_camera.live.publishing.what_is_shown import FacePresence, Situation, what_is_shown
 from relit_camera.live.reenactment.source_image import SourceFace
@@ -25,6 +27,16 @@ from relit_camera.subject.subject import Subject
 
 REST_S = 0.3
 """Time constant with which the factor of a person whose face is not seen follows what is known."""
+
+
+@dataclass(frozen=True)
+class _Further:
+    """What is known of a further face, and of what frame: its motion there, where that was cut, and how it is relit."""
+
+    lighting: FaceLighting
+    motion: FaceMotion | None = None
+    middle: tuple[float, float] = MIDDLE
+    plan: FacePlan | None = None
 
 
 class LiveMode:
@@ -48,7 +60,7 @@ class LiveMode:
         self._compared = context.open_scene_relighting(first.relighting.subject, first.relighting.face)
         self._first = FaceLighting(first, self._compared, context.timer)
         self._as_anyone: LitAs | None = None
-        self._others: dict[int, FaceLighting] = {}
+        self._others: dict[int, _Further] = {}
         self._frames = FrameRelighting()
         self._cut = FaceCut(context.size)
         self._told = False
@@ -74,11 +86,8 @@ class LiveMode:
         lit = self._first.update(fitted, live, scene, quality)
         self._told = self._told or lit.mean is not None
         rest = self._compared.place_tint(scene, frame.time_s) if lit.mean is None else lit.mean
-        further = self._further(
-            {number: fit_motion(each, frame.size, context.size, middle) for number, each in others.items()}
-        )
-        plans = (lighting.update(each, live, scene, quality).plan for lighting, each in further)
-        plan = FramePlan(live, self._eased_rest(rest, frame.time_s), lit.plan, tuple(each for each in plans if each))
+        further = self._further(live, frame.size, middle, scene, quality, others)
+        plan = FramePlan(live, self._eased_rest(rest, frame.time_s), lit.plan, further)
         return partial(self._render, plan, self._seen(plan), motion, scene, quality.matte_every)
 
     def _render(
@@ -97,19 +106,36 @@ class LiveMode:
         image = split_view(image, live.image, lighting.split)
         return RenderedFrame(image, motion, scene, shown, unlit=scene.look.shows_filmed)
 
-    def _further(self, motions: Mapping[int, FaceMotion]) -> list[tuple[FaceLighting, FaceMotion]]:
-        """What is known of each further face, and its motion; those that are not followed any more are forgotten."""
-        context = self._context
-        self._others = {number: each for number, each in self._others.items() if number in motions}
-        for number in motions:
-            if number not in self._others:
+    def _further(
+        self,
+        live: Frame,
+        filmed_size: tuple[int, int],
+        middle: tuple[float, float],
+        scene: Scene,
+        quality: RenderQuality,
+        motions: Mapping[int, FaceMotion],
+    ) -> tuple[FacePlan, ...]:
+        """How the further faces are relit; those that are not followed any more are forgotten.
+
+        A face whose motion is that of the last frame is relit as it was there.
+        """
+        context, kept = self._context, self._others
+        self._others = {}
+        for number, motion in motions.items():
+            known = kept.get(number)
+            if known is None:
                 if self._as_anyone is None:
                     self._as_anyone = self._prepare(*context.anyone())
                 relighting = self._as_anyone.relighting
                 compared = context.open_scene_relighting(relighting.subject, relighting.face)
                 first_frame = self._rest is None
-                self._others[number] = FaceLighting(self._as_anyone, compared, context.timer, at_once=first_frame)
-        return [(self._others[number], motion) for number, motion in motions.items()]
+                known = _Further(FaceLighting(self._as_anyone, compared, context.timer, at_once=first_frame))
+            if known.motion is not motion or known.middle != middle:
+                fitted = fit_motion(motion, filmed_size, context.size, middle)
+                plan = known.lighting.update(fitted, live, scene, quality).plan
+                known = _Further(known.lighting, motion, middle, plan)
+            self._others[number] = known
+        return tuple(each.plan for each in self._others.values() if each.plan is not None)
 
     def _seen(self, plan: FramePlan) -> FacePresence:
         if plan.first is not None:
