@@ -100,6 +100,17 @@ def test_the_picture_is_looked_at_once_a_second_and_never_where_there_is_no_room
     assert full.crowd.looks <= 2 + 4 * checks + 4
 
 
+def test_they_take_turns() -> None:
+    camera = Camera(*PLACES)
+    before, looked = camera.frames(30)[1], dict.fromkeys((1, 2, 3), 0)
+    for _ in range(12):
+        now = camera.frames(1)[1]
+        for number, motion in now.items():
+            looked[number] += motion is not before[number]
+        before = now
+    assert looked == {1: 4, 2: 4, 3: 4}
+
+
 def test_who_comes_gets_the_next_number_and_who_goes_is_forgotten() -> None:
     camera = Camera("first")
     assert camera.frames(10)[1] == {}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Any
 
 import cv2
 import numpy as np
@@ -20,11 +21,19 @@ from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.light.light_map import LightMap
 from relit_camera.light.light_map_rotation import rotate_light_map
 from relit_camera.live.modes.frame_fitting import fit_motion
-from relit_camera.live.modes.frame_relighting import FacePlan, FramePlan, FrameRelighting, extrapolate_roots
+from relit_camera.live.modes.frame_relighting import (
+    CAST_KEPT,
+    MOST_KEPT,
+    FacePlan,
+    FramePlan,
+    FrameRelighting,
+    extrapolate_roots,
+)
 from relit_camera.live.modes.ratio_relighting import (
     BOX_CELLS,
     CASTS,
     FACTORS,
+    FaceCells,
     FaceLight,
     RatioRelighting,
     _cells_within,
@@ -321,6 +330,43 @@ def beside(motion: FaceMotion, left: int, size: tuple[int, int]) -> FaceMotion:
     axis_px = (left + size[0] / 4 - size[0] / 2, 0.0)
     landmarks = motion.landmarks + np.array([left, 0], np.float32)
     return replace(motion, landmarks=landmarks, pose=replace(pose, axis_px=axis_px))
+
+
+def test_what_is_no_skin_keeps_most_of_the_room_s_color_and_skin_nothing() -> None:
+    """The face says that the room is red; a gray sweater that was gray in that room is known not to turn green."""
+    ratio, motion = person().ratio, before_the_camera()
+    image = live_picture(WINDOW).copy()
+    image[-60:] = 120
+    frame = live_frame(image, 0)
+    light = face_light(ratio, still_under(WINDOW), still_under(WINDOW), motion, frame)
+    red = np.array([1.2, 0.95, 0.9], np.float32)
+    lights = (light, replace(light, cast=red))
+    plain, kept = (FrameRelighting().apply(planned(ratio, frame, each)).factor for each in lights)
+    told = light_of_root(np.asarray(kept / plain, np.float32))
+    rows, columns = told.shape[:2]
+    np.testing.assert_allclose(told[rows // 2, columns // 2], 1, atol=0.01)
+    np.testing.assert_allclose(told[-5, columns // 2], red**CAST_KEPT, rtol=0.02)
+    strong = replace(light, cast=np.array([3.0, 0.6, 0.3], np.float32))
+    most = light_of_root(np.asarray(FrameRelighting().apply(planned(ratio, frame, strong)).factor / plain, np.float32))
+    np.testing.assert_allclose(most[-5, columns // 2], np.exp([MOST_KEPT, -MOST_KEPT, -MOST_KEPT]), rtol=0.02)
+
+
+def test_a_plan_of_the_last_frame_tells_what_it_told_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    ratio, motion, frame = person().ratio, before_the_camera(), live_frame(live_picture(WINDOW), 0)
+    light = face_light(ratio, still_under(EVENING), still_under(WINDOW), motion, frame)
+    asked = []
+
+    def cells(*given: Any) -> FaceCells:
+        asked.append(given)
+        return RatioRelighting.cells(ratio, *given)
+
+    monkeypatch.setattr(ratio, "cells", cells)
+    frames, first, other = FrameRelighting(), FacePlan(ratio, light, 1.0), FacePlan(ratio, light, 0.5)
+    one = frames.apply(FramePlan(frame, REST, first, (other,)))
+    assert len(asked) == 2
+    two = frames.apply(FramePlan(frame, REST, replace(first), (other,)))
+    assert len(asked) == 3
+    np.testing.assert_array_equal(one.factor, two.factor)
 
 
 def test_each_of_two_persons_is_relit_by_their_own_face() -> None:

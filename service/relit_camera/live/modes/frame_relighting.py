@@ -225,16 +225,16 @@ def _keep_cast(
     small = (-(-columns // HUE_REDUCTION), -(-rows // HUE_REDUCTION))
     logarithms = cv2.split(cv2.LUT(cv2.resize(image, small, interpolation=cv2.INTER_LINEAR), _LOGARITHMS))
     hue = [cv2.subtract(logarithms[channel], logarithms[1]) for channel in (0, 2)]
-    skin = np.zeros(small[::-1], np.float32)
-    for cells in told:
+    skin, nearby = np.zeros(small[::-1], np.float32), np.zeros((len(told), *small[::-1]), np.float32)
+    for index, cells in enumerate(told):
         left, top, right, bottom = (side // HUE_REDUCTION for side in cells.box)
         inside = np.s_[top:bottom, left:right]
         if right <= left or bottom <= top:
             continue
         shown = cv2.multiply(cells.source.face, cells.source.confidence)
-        on_face, skin_there = (
+        on_face, skin_there, nearby[index][inside] = (
             cv2.resize(each, (right - left, bottom - top), interpolation=cv2.INTER_LINEAR)
-            for each in (shown, cells.source.skin)
+            for each in (shown, cells.source.skin, cells.source.confidence)
         )
         seen = on_face * skin_there > 0.5
         if not seen.any():
@@ -244,11 +244,19 @@ def _keep_cast(
         near = cv2.exp((red * red + blue * blue) * np.float32(-1 / SKIN_HUE**2))
         near[inside] = np.maximum(near[inside], on_face)
         skin = np.maximum(skin, near)
-    cast = CAST_KEPT * np.mean([np.log(np.maximum(face.light.cast, 1e-3)) for face in faces], axis=0)
-    more = np.expm1(np.clip(cast, -MOST_KEPT, MOST_KEPT) / POWER)
-    other = cv2.resize(cv2.blur(1 - skin, (3, 3)), (columns, rows), interpolation=cv2.INTER_LINEAR)
-    kept = cv2.merge([other * np.float32(each) + 1 for each in more])
+    casts = CAST_KEPT * np.log(np.maximum([face.light.cast for face in faces], 1e-3))
+    more = np.expm1(np.clip(casts, -MOST_KEPT, MOST_KEPT) / POWER).astype(np.float32)
+    other = cv2.blur(1 - skin, (3, 3))[..., None] * (more[0] if len(told) == 1 else _by_whom(nearby, more))
+    kept = cv2.resize(np.asarray(other, np.float32), (columns, rows), interpolation=cv2.INTER_LINEAR)
+    cv2.add(kept, (1.0,) * 4, dst=kept)
     cv2.multiply(factor, kept, dst=factor)
+
+
+def _by_whom(nearby: NDArray[np.float32], values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Values (persons, 3) of whoever is nearest, (rows, columns, 3), by where each is (persons, rows, columns)."""
+    sigma = nearby.shape[2] / 12
+    wide = np.stack([cv2.GaussianBlur(each, (0, 0), sigma) for each in nearby], axis=-1) + np.float32(1e-4)
+    return np.asarray((wide / wide.sum(axis=-1, keepdims=True)) @ values, np.float32)
 
 
 def _pixels_of(cells: Box, step: int, size: tuple[int, int]) -> Box:
