@@ -22,6 +22,7 @@ ADDRESS = "http://127.0.0.1:8470/api/v1"
 TRACK = f"{GUEST_PROGRAM}/relit_camera/app/demo/data/track.json"
 EXPECTED = ("no-subject", "reduced-quality")
 """What a camera here may say: it has no subject, and shows its source as it is, and an emulated machine is slow."""
+NOBODY = "nobody.yaml"
 ROOM = "room.hdr"
 """A small environment: an emulated machine takes a quarter of a minute to paint one of the built-in ones."""
 
@@ -33,7 +34,10 @@ class Camera:
         """Start it with these arguments; of its output the end is kept."""
         self.machine = machine
         limits = f"export RELIT_SOURCE__WIDTH={SIZE[0]} RELIT_SOURCE__HEIGHT={SIZE[1]} RELIT_SOURCE__FPS={FPS} "
-        limits += f"RELIT_OUTPUT__FPS={FPS} RELIT_OUTPUT__KEEP_S=900; "  # a start takes minutes on a busy machine
+        limits += f"RELIT_OUTPUT__FPS={FPS} RELIT_OUTPUT__KEEP_S=900 "  # a start takes minutes on a busy machine
+        # With nobody chosen it shows its source as it is, where that is allowed: whoever comes would need networks.
+        (machine.host / NOBODY).write_text("subject: null\n")
+        limits += f"RELIT_CONFIG=/host/{NOBODY}; "
         self.command = started(machine, f"{limits}exec relit run {arguments}", timeout_s=1800.0)
 
     def status(self) -> dict[str, Any]:
