@@ -158,6 +158,62 @@ def test_when_the_first_one_has_left_the_camera_is_for_another() -> None:
     assert camera.is_at(next(iter(others.values())), "behind")
 
 
+def test_whoever_moves_to_where_another_left_stays_who_they_are() -> None:
+    camera = Camera("first", "left", "behind")
+    followed = camera.frames(10)[1]
+    (mover,) = (number for number, each in followed.items() if camera.is_at(each, "behind"))
+    del camera.crowd.points["left"]
+    camera.frames(10)
+    there = face(at=PLACES["left"]).landmarks
+    for share in np.linspace(0, 1, 40):  # slowly enough to be followed
+        camera.crowd.points["behind"] = (face(at=PLACES["behind"]).landmarks * (1 - share) + there * share).astype(
+            np.float32
+        )
+        others = camera.frames(1)[1]
+    others = camera.frames(6)[1]
+    assert others[mover].status is FaceStatus.FOUND
+    assert camera.is_at(others[mover], "behind")
+
+
+def test_heads_together_stay_who_they_are() -> None:
+    camera = Camera("first", "left")
+    camera.frames(10)
+    start, near = camera.crowd.points["left"].copy(), camera.crowd.points["first"] - np.array([75, 0], np.float32)
+    for share in np.linspace(0, 1, 40):
+        camera.crowd.points["left"] = (start * (1 - share) + near * share).astype(np.float32)
+        state, _ = camera.frames(1)
+        assert state.visible
+        assert camera.is_at(state, "first")
+
+
+def test_turns_are_even_after_coming_and_going() -> None:
+    camera = Camera(*PLACES)
+    camera.frames(10)
+    for name in ("left", "right"):  # two of them leave and come back long after: they have new numbers
+        points = camera.crowd.points.pop(name)
+        camera.frames(round(TUNABLES.forgotten_s * 30) + 40)
+        camera.crowd.points[name] = points
+        camera.frames(round(TUNABLES.look_s * 30) + 2)
+    before, looked = camera.frames(1)[1], []
+    for _ in range(6):
+        now = camera.frames(1)[1]
+        looked.append(sum(motion is not before[number] for number, motion in now.items()))
+        before = now
+    assert looked == [1] * 6
+
+
+def test_while_they_are_forgotten_the_tracker_passes_over_nobody() -> None:
+    camera = Camera("first", "left")
+    camera.frames(5)
+    assert len(camera.tracker.besides) == 1
+    camera.faces.release()
+    assert camera.tracker.besides == ()
+    camera.frames(1)
+    assert len(camera.tracker.besides) == 1
+    camera.faces.forget()
+    assert camera.tracker.besides == ()
+
+
 def test_a_face_that_is_too_small_is_not_followed() -> None:
     camera = Camera("first")
     camera.crowd.points["far"] = face(at=(60, 0, -900)).landmarks

@@ -170,6 +170,7 @@ class Pipeline:
         tracked = None if scene.shows_nobody else self._track(frame, scene, quality)
         scene = scene_now()
         if scene.shows_nobody:
+            self._further_faces.forget()
             return lambda: self._render_unrelit(frame, scene)
         if tracked is None:  # the subject was chosen while this frame went untracked: no unlit picture under its scene
             tracked = self._track(frame, scene, quality)
@@ -203,6 +204,7 @@ class Pipeline:
             state = self._live_tracker.track(frame)
             motion = self._follower.follow(state, frame.size, frame.time_s)
         if not is_live:
+            self._further_faces.forget()
             return motion, {}
         with self.timer.stage("others"):
             return motion, self._further_faces.follow(frame, state, every)
@@ -266,6 +268,7 @@ class Pipeline:
         if active is not None and same_subject and active.name is name:
             return active.mode
         self.on_opening()
+        self._further_faces.release()  # or the tracker would pass over a face in the source image
         with large_allocations_apart():
             relighter = active.relighter if active is not None and same_subject else self._open_relighter(subject)
             face = find_source_face(subject, self._tracker)

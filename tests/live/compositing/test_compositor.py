@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import cv2
 import numpy as np
 import pytest
 
@@ -137,6 +138,19 @@ def test_before_a_kept_room_the_matte_may_be_that_of_the_last_frame(background: 
         picture = composed(made, relit_picture(), live_frame(index / 30), scene(background), None, 2)
     assert Counting.asked == looks
     np.testing.assert_array_equal(picture[:, :32], relit_picture()[:, :32])
+
+
+@pytest.mark.parametrize("background", [NoBackground(), BlurBackground(), GREEN])
+def test_no_more_of_a_picture_is_looked_at_than_is_needed(background: object) -> None:
+    random, live, shown = np.random.default_rng(0), live_frame(), scene(background)
+    relit = random.integers(0, 255, live.image.shape).astype(np.uint8)
+    made = compositor()
+    alpha = cv2.GaussianBlur(made.person_alpha(live, shown), (0, 0), 2)
+    left, top, right, bottom = made.needed(alpha, shown)
+    part = random.integers(0, 255, live.image.shape).astype(np.uint8)
+    part[top:bottom, left:right] = relit[top:bottom, left:right]
+    whole = compositor().composite_live(relit, alpha, live, shown)
+    assert np.abs(made.composite_live(part, alpha, live, shown).astype(int) - whole).max() <= 1
 
 
 def test_a_matte_that_is_blind_leaves_nobody_unlit() -> None:

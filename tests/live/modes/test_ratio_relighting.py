@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
+from relit_camera.base.config.look import ANYONE
 from relit_camera.base.images.color import LUMINANCE, linear_from_uint8
 from relit_camera.base.images.image_quality import psnr
 from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage, Points
@@ -349,6 +350,29 @@ def test_what_is_no_skin_keeps_most_of_the_room_s_color_and_skin_nothing() -> No
     strong = replace(light, cast=np.array([3.0, 0.6, 0.3], np.float32))
     most = light_of_root(np.asarray(FrameRelighting().apply(planned(ratio, frame, strong)).factor / plain, np.float32))
     np.testing.assert_allclose(most[-5, columns // 2], np.exp([MOST_KEPT, -MOST_KEPT, -MOST_KEPT]), rtol=0.02)
+
+
+def test_the_color_that_is_kept_is_eased_as_the_face_is() -> None:
+    ratio, motion, frame = person().ratio, before_the_camera(), live_frame(live_picture(WINDOW), 0)
+    light = face_light(ratio, still_under(WINDOW), still_under(WINDOW), motion, frame)
+    red = replace(light, cast=np.array([1.2, 0.95, 0.9], np.float32))
+    for presence, most in ((0.01, 0.01), (1.0, 1.0)):
+        plain, kept = (FrameRelighting().apply(planned(ratio, frame, each, presence)).factor for each in (light, red))
+        assert np.abs(kept / plain - 1).max() < 0.2 * most
+
+
+def test_what_others_tell_of_a_frame_before_shows_nothing_of_it() -> None:
+    """A further face's cells may be of the last frame: none of its pixels are in this one."""
+    subject, motion = close_up(), before_the_camera()
+    nobodys = replace(subject, metadata=subject.metadata.model_copy(update={"method": ANYONE}))
+    ratio = RatioRelighting(nobodys, face_of(subject), DenseMotion(SessionOptions("cpu")))
+    noise = np.random.default_rng(0).integers(-9, 10, live_picture(WINDOW).shape)
+    dark, bright = (live_frame(np.clip(code + noise, 0, 255).astype(np.uint8), 0) for code in (30, 220))
+    light = face_light(ratio, 8 * still_under(WINDOW), still_under(WINDOW), motion, dark)
+    plan = FramePlan(dark, REST, None, (FacePlan(ratio, light, 1.0),))
+    frames = FrameRelighting()
+    frames.apply(replace(plan, frame=bright))
+    np.testing.assert_array_equal(frames.apply(plan).picture(), FrameRelighting().apply(plan).picture())
 
 
 def test_a_plan_of_the_last_frame_tells_what_it_told_there(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -24,7 +24,7 @@ def box_to_fill(picture: tuple[int, int], size: tuple[int, int], middle: tuple[f
     `middle` is where it lies, as shares of the picture's width and height, as far as the picture allows.
     """
     scale = max(size[0] / picture[0], size[1] / picture[1])
-    columns, rows = (min(side, round(to / scale)) for side, to in zip(picture, size, strict=True))
+    columns, rows = (min(side, max(round(to / scale), 1)) for side, to in zip(picture, size, strict=True))
     left, top = (
         min(max(int(share * side - cut / 2), 0), side - cut)
         for share, side, cut in zip(middle, picture, (columns, rows), strict=True)

@@ -96,6 +96,17 @@ class FurtherFaces:
         self._count = self._frames = 0
         self._looked_s = self._first_s = self._time_s = float("-inf")
 
+    def forget(self) -> None:
+        """Follow none of them: the next call of `follow` looks anew."""
+        self._faces.clear()
+        self._looked_s = self._first_s = float("-inf")
+        self.release()
+
+    def release(self) -> None:
+        """Leave all faces of the next picture to the tracker of the first."""
+        if self._tracker is not None:
+            self._tracker.besides = ()
+
     def follow(self, frame: Frame, first: FaceState, every: int) -> Mapping[int, FaceMotion]:
         """Their motion in the next frame, each under a number that it keeps. One that is lost stays for a while.
 
@@ -109,18 +120,17 @@ class FurtherFaces:
         if self._tracker is None:
             return {}
         if frame.time_s < self._time_s:  # a film begins again
-            self._faces.clear()
-            self._looked_s = self._first_s = float("-inf")
+            self.forget()
         self._time_s = frame.time_s
         if first.visible:
             self._first_s = frame.time_s
         taken = (bounding_box(first.landmarks),) if first.visible else ()
         self._frames += 1
         turns = min(len(self._faces) + 1, TUNABLES.turns)
-        for number, face in self._faces.items():
-            if (self._frames + number) % turns:
+        for place, face in enumerate(self._faces.values()):
+            if (self._frames + place) % turns:
                 continue
-            others = (*taken, *(each.box for other, each in self._faces.items() if other != number))
+            others = (*taken, *(each.box for each in self._faces.values() if each is not face and not each.is_lost))
             face.track(frame, every, others)
         self._drop(frame.time_s, taken)
         if self._is_due(frame.time_s):
@@ -132,13 +142,13 @@ class FurtherFaces:
 
     def _drop(self, now_s: float, taken: tuple[Box, ...]) -> None:
         """Forget those that were lost for long, and those that have slid onto another face."""
-        kept: dict[int, _Further] = {}
-        for number, face in self._faces.items():
-            boxes = (*taken, *(each.box for each in kept.values()))
-            doubled = any(is_same_face(face.box, each) for each in boxes)
-            if not doubled and now_s - face.seen_s <= TUNABLES.forgotten_s:
-                kept[number] = face
-        self._faces = kept
+        kept = list(taken)
+        for number, face in sorted(self._faces.items(), key=lambda each: each[1].is_lost):
+            doubled = any(is_same_face(face.box, each) for each in kept)
+            if doubled or now_s - face.seen_s > TUNABLES.forgotten_s:
+                del self._faces[number]
+            else:
+                kept.append(face.box)
 
     def _is_due(self, now_s: float) -> bool:
         sought = any(face.is_lost for face in self._faces.values())

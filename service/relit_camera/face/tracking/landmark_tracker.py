@@ -17,7 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.images.image_types import DisplayImage, Frame, Points
-from relit_camera.face.detection.face_detector import Box, Detection, FaceDetector, is_same_face
+from relit_camera.face.detection.face_detector import (
+    Box,
+    Detection,
+    FaceDetector,
+    intersection_over_union,
+    is_same_face,
+)
 from relit_camera.face.face_state import LOST, FaceState, FaceStatus
 from relit_camera.face.head_pose import fit_pose
 from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme
@@ -210,7 +216,8 @@ class LandmarkTracker:
             self._frames_since_check = self._check_every
             reading = self._network.read(image, self._network.crop_from_points(reading.points))
         box = bounding_box(reading.points)
-        slid = any(is_same_face(box, each) for each in self.besides)
+        overlap = intersection_over_union(box, bounding_box(last))
+        slid = any(intersection_over_union(box, each) > overlap for each in self.besides)
         return None if slid or reading.confidence < self._network.threshold else reading
 
     def _start(self, image: DisplayImage, detection: Detection) -> tuple[FaceStatus, LandmarkPrediction | None]:

@@ -15,7 +15,7 @@ from relit_camera.base.images.color import linear_from_uint8, uint8_from_linear
 from relit_camera.base.images.image_types import Alpha, DisplayImage, LinearImage, RgbaImage, check_image
 from relit_camera.live.compositing.matted_frame import MattedFrame
 
-_NEIGHBORHOOD = 1 / 7
+NEIGHBORHOOD = 1 / 7
 """Width, as a share of the picture's height, of the window in which an edge's pure colours are sought, or a little more
 or less: the picture is halved until that is about `_WINDOW`."""
 
@@ -188,9 +188,9 @@ def _share_by_color(
 
 
 def _halvings(rows: int) -> int:
-    """How often a picture of so many rows is halved until `_NEIGHBORHOOD` of it is about `_WINDOW` pixels."""
+    """How often a picture of so many rows is halved until `NEIGHBORHOOD` of it is about `_WINDOW` pixels."""
     count = 0
-    while rows * _NEIGHBORHOOD >= 1.5 * _WINDOW:
+    while rows * NEIGHBORHOOD >= 1.5 * _WINDOW:
         rows, count = rows // 2, count + 1
     return count
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import cv2
@@ -12,7 +13,7 @@ from relit_camera.base.config.look import BlurBackground, NoBackground
 from relit_camera.base.errors import ModelError
 from relit_camera.base.images.image_types import Alpha, DisplayImage, Frame
 from relit_camera.face.matting import Matting
-from relit_camera.live.compositing.alpha_compositing import over, replace_room, split_alpha
+from relit_camera.live.compositing.alpha_compositing import NEIGHBORHOOD, over, replace_room, split_alpha
 from relit_camera.live.compositing.background_renderer import (
     BackgroundRenderer,
     BackgroundRequest,
@@ -87,6 +88,21 @@ class Compositor:
         if kept and not matte.any():
             return None  # better the room is relit than somebody who is there is not
         return np.maximum(matte, _sure_alpha(person, frame.size))
+
+    def needed(self, alpha: Alpha, scene: Scene) -> tuple[int, int, int, int]:
+        """Left, top, right and bottom of what `composite_live` looks at of a picture of people with this alpha.
+
+        Before another background that is more than they fill: it is told from what is near what shines through.
+        """
+        left, top, width, height = cv2.boundingRect(alpha)
+        rows, columns = alpha.shape
+        more = 0 if isinstance(scene.look.background, NoBackground) else math.ceil(NEIGHBORHOOD * rows)
+        return (
+            max(left - more, 0),
+            max(top - more, 0),
+            min(left + width + more, columns),
+            min(top + height + more, rows),
+        )
 
     def composite_live(self, picture: DisplayImage, alpha: Alpha | None, frame: Frame, scene: Scene) -> DisplayImage:
         """The people of a live picture before the scene's background; both are of the output's size.

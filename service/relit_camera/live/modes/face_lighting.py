@@ -136,7 +136,8 @@ class FaceLighting:
             positions = relighting.positions(motion, motion.pose, frame.size)
             eye_distance = face.scheme.eye_span(motion.landmarks)
             light = FaceLight(room.gain, room.cast(self._tint), pictures, positions, eye_distance)
-            return LitFace(mean, FacePlan(relighting, relighting.aligned(frame, light, presence), presence))
+            aligned = relighting.aligned(frame, light, presence)
+            return LitFace(mean, FacePlan(relighting, aligned, presence, motion.status is not FaceStatus.LOST))
 
     def _is_followed(self, motion: FaceMotion) -> bool:
         """Whether the face tells its light: it is seen, and not in profile."""

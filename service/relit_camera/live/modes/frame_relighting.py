@@ -46,11 +46,13 @@ class FacePlan:
         relighting: of whom it is lit as.
         light: on the face.
         presence: how far the face tells its light, 0..1 and more than 0.
+        is_seen: whether the frame shows it: a light goes on for a moment.
     """
 
     relighting: RatioRelighting
     light: FaceLight
     presence: float
+    is_seen: bool = True
 
 
 @dataclass(frozen=True)
@@ -85,8 +87,8 @@ class RelitCells:
         factor: (rows, columns, 3) float32 roots of the factors of light.
         added: (rows, columns, 3) float32 roots that are added after that.
         as_shown: see `multiply_light`.
-        person: (rows, columns) float32, how surely cells show what the first one's source image has there of them,
-            0..1; None where they are not followed.
+        person: (rows, columns) float32, how surely cells show what a source image has there of a person whose face
+            is seen, 0..1; None where none is.
     """
 
     frame: DisplayImage
@@ -148,11 +150,11 @@ class FrameRelighting:
             self._last = [(face, known.get(id(face)) or _told_by(face, image, whole)) for face in plan.faces]
             told = [cells for _, cells in self._last]
             shares = [face.presence for face in plan.faces]
-            factor, added = _combined(image, step, factor, told, shares)
+            factor, added = _combined(image, step, factor, told, shares, plan.first is not None)
             _keep_cast(factor, image, plan.faces, told)
-            if plan.first is not None:
-                person = np.zeros((rows, columns), np.float32)
-                person[_inside(told[0].box)] = told[0].sure
+            person = _sure_of(
+                (rows, columns), [each for each, face in zip(told, plan.faces, strict=True) if face.is_seen]
+            )
         if blend < 1:
             live, _ = live_cells(image, step, (0, 0, columns, rows))
             factor, added = blend_toward_live(factor, added, live, blend)
@@ -164,8 +166,24 @@ def _told_by(face: FacePlan, image: DisplayImage, box: Box | None) -> FaceCells:
     return face.relighting.cells(image, face.light, box or face.relighting.box(face.light))
 
 
+def _sure_of(shape: tuple[int, int], told: list[FaceCells]) -> NDArray[np.float32] | None:
+    """How surely cells show a person, (rows, columns); None where nobody tells anything."""
+    if not told:
+        return None
+    person = np.zeros(shape, np.float32)
+    for cells in told:
+        inside = _inside(cells.box)
+        person[inside] = np.maximum(person[inside], cells.sure)
+    return person
+
+
 def _combined(
-    image: DisplayImage, step: int, rest: NDArray[np.float32], told: list[FaceCells], shares: list[float]
+    image: DisplayImage,
+    step: int,
+    rest: NDArray[np.float32],
+    told: list[FaceCells],
+    shares: list[float],
+    first_told: bool,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """The factor of all cells, and what is added, (rows, columns, 3), by what faces tell.
 
@@ -175,6 +193,7 @@ def _combined(
         rest: (rows, columns, 3) factor where nobody tells their light.
         told: by each face.
         shares: presence of each.
+        first_told: whether the first of them is the face that the camera is for, of this very frame.
     """
     presence = max(shares)
     parts = [_scaled(cells, share / presence) for cells, share in zip(told, shares, strict=True)]
@@ -192,7 +211,7 @@ def _combined(
         if index > 0:
             more += added[inside] * trust
         told_here = cv2.multiply(factor[inside], trust)
-        if index == 0:  # others are smaller
+        if index == 0 and first_told:  # others are smaller, and told by a frame before this
             noise = noise_fraction(image, step, cells.box, np.asarray(told_here, np.float32), cells.source, cells.unit)
             calm = cv2.multiply(told_here, cv2.merge([noise] * 3))
             told_here = cv2.subtract(told_here, calm)
@@ -236,16 +255,18 @@ def _keep_cast(
             cv2.resize(each, (right - left, bottom - top), interpolation=cv2.INTER_LINEAR)
             for each in (shown, cells.source.skin, cells.source.confidence)
         )
+        skin[inside] = np.maximum(skin[inside], on_face * np.float32(faces[index].presence))
         seen = on_face * skin_there > 0.5
         if not seen.any():
             continue
         red, blue = (each - np.median(each[inside][seen]) for each in hue)
         red *= np.where(red > 0, np.float32(REDDER), 1)
         near = cv2.exp((red * red + blue * blue) * np.float32(-1 / SKIN_HUE**2))
-        near[inside] = np.maximum(near[inside], on_face)
-        skin = np.maximum(skin, near)
+        skin = np.maximum(skin, near * np.float32(faces[index].presence))
     casts = CAST_KEPT * np.log(np.maximum([face.light.cast for face in faces], 1e-3))
-    more = np.expm1(np.clip(casts, -MOST_KEPT, MOST_KEPT) / POWER).astype(np.float32)
+    presence = np.array([[face.presence] for face in faces], np.float32)
+    more = presence * np.expm1(np.clip(casts, -MOST_KEPT, MOST_KEPT) / POWER).astype(np.float32)
+    nearby *= presence[..., None]
     other = cv2.blur(1 - skin, (3, 3))[..., None] * (more[0] if len(told) == 1 else _by_whom(nearby, more))
     kept = cv2.resize(np.asarray(other, np.float32), (columns, rows), interpolation=cv2.INTER_LINEAR)
     cv2.add(kept, (1.0,) * 4, dst=kept)

@@ -6,13 +6,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.base.images.image_types import Alpha, DisplayImage, Frame
+from relit_camera.base.images.image_types import DisplayImage, Frame
 from relit_camera.base.images.resize import MIDDLE
-from relit_camera.face.face_state import FaceStatus
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.modes.face_lighting import FaceLighting, LitAs
 from relit_camera.live.modes.frame_fitting import FaceCut, fit_frame, fit_motion
@@ -20,7 +18,6 @@ from relit_camera.live.modes.frame_relighting import FacePlan, FramePlan, FrameR
 from relit_camera.live.modes.mode import ModeContext, RenderedFrame, RenderTask
 from relit_camera.live.publishing.what_is_shown import FacePresence, Situation, what_is_shown
 from relit_camera.live.reenactment.source_image import SourceFace
-from relit_camera.live.reenactment.warp import Box
 from relit_camera.live.render_quality import RenderQuality
 from relit_camera.live.scene.scene import Scene
 from relit_camera.subject.subject import Subject
@@ -97,9 +94,8 @@ class LiveMode:
         context, lighting, live = self._context, scene.look.lighting, plan.frame
         with context.timer.stage("move"):
             relit = self._frames.apply(plan, lighting.blend)
-            person = None if motion.status is FaceStatus.LOST else relit.person  # who is lost is there no more
-            alpha = context.compositor.person_alpha(live, scene, person, matte_every)
-            picture = relit.picture(None if alpha is None else bounding_box(alpha))
+            alpha = context.compositor.person_alpha(live, scene, relit.person, matte_every)
+            picture = relit.picture(None if alpha is None else context.compositor.needed(alpha, scene))
         with context.timer.stage("compose"):
             image = context.compositor.composite_live(picture, alpha, live, scene)
         shown = what_is_shown(Situation(scene.look.mode, seen))
@@ -149,12 +145,6 @@ class LiveMode:
             self._rest = factor
         self._rest = self._rest + (factor - self._rest) * np.float32(1 - np.exp(-passed / REST_S))
         return self._rest
-
-
-def bounding_box(alpha: Alpha) -> Box:
-    """Left, top, right and bottom of what is not clear."""
-    left, top, width, height = cv2.boundingRect(alpha)
-    return left, top, left + width, top + height
 
 
 def split_view(relit: DisplayImage, live: DisplayImage, share: float) -> DisplayImage:
