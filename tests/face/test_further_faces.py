@@ -164,13 +164,11 @@ def test_whoever_moves_to_where_another_left_stays_who_they_are() -> None:
     (mover,) = (number for number, each in followed.items() if camera.is_at(each, "behind"))
     del camera.crowd.points["left"]
     camera.frames(10)
-    there = face(at=PLACES["left"]).landmarks
+    here, there = (face(at=PLACES[name]).landmarks for name in ("behind", "left"))
     for share in np.linspace(0, 1, 40):  # slowly enough to be followed
-        camera.crowd.points["behind"] = (face(at=PLACES["behind"]).landmarks * (1 - share) + there * share).astype(
-            np.float32
-        )
-        others = camera.frames(1)[1]
-    others = camera.frames(6)[1]
+        camera.crowd.points["behind"] = (here * (1 - share) + there * share).astype(np.float32)
+        camera.frames(1)
+    others = camera.frames(30)[1]
     assert others[mover].status is FaceStatus.FOUND
     assert camera.is_at(others[mover], "behind")
 
