@@ -21,6 +21,7 @@ from relit_camera.live.modes.live_mode import LiveMode
 from relit_camera.live.modes.mode import ModeContext, ModeFactory, RenderMode
 from relit_camera.live.modes.portrait_mode import PortraitMode
 from relit_camera.live.modes.ratio_relighting import RatioRelighting, as_large_as_needed
+from relit_camera.live.modes.room_light_estimator import RoomLightEstimator
 from relit_camera.live.pipeline import Pipeline
 from relit_camera.live.publishing.placeholder_image import placeholder
 from relit_camera.live.reenactment.dense_motion import DenseMotion
@@ -122,6 +123,7 @@ def mode_factories(settings: RelitSettings) -> Mapping[Mode, ModeFactory]:
         return PortraitMode(context, open_reenactor(settings.reenact.reenactor, reenactor))
 
     def lit_as(subject: Subject, face: SourceFace) -> LitAs:
-        return LitAs(subject, face, RatioRelighting(*as_large_as_needed(subject, face), DenseMotion(session)))
+        relighting = RatioRelighting(*as_large_as_needed(subject, face), DenseMotion(session))
+        return LitAs(subject, face, relighting, RoomLightEstimator(subject, face))
 
     return {Mode.LIVE: partial(LiveMode, prepare=lit_as), Mode.PORTRAIT: portrait}

@@ -20,6 +20,7 @@ from relit_camera.light.light_map import LightMap
 from relit_camera.live.modes.face_lighting import EASE_S, MOST_TURN_DEG, FaceLighting, LitAs
 from relit_camera.live.modes.frame_relighting import FramePlan, FrameRelighting
 from relit_camera.live.modes.ratio_relighting import RatioRelighting
+from relit_camera.live.modes.room_light_estimator import RoomLightEstimator
 from relit_camera.live.modes.scene_relighting import SceneRelighting
 from relit_camera.live.reenactment.dense_motion import DenseMotion
 from relit_camera.live.reenactment.source_image import SourceFace
@@ -47,7 +48,8 @@ def captured(turn: Rotation) -> LitAs:
     landmarks = project(SCHEME.canonical, pose, subject.size)
     subject = replace(subject, landmarks={SCHEME.name: landmarks})
     face = face_of(subject)
-    return LitAs(subject, face, RatioRelighting(subject, face, DenseMotion(SessionOptions("cpu"))))
+    relighting = RatioRelighting(subject, face, DenseMotion(SessionOptions("cpu")))
+    return LitAs(subject, face, relighting, RoomLightEstimator(subject, face))
 
 
 def lighting_of(lit_as: LitAs, at_once: bool = True) -> FaceLighting:
@@ -88,6 +90,18 @@ def test_a_head_that_was_captured_turned_is_lit_as_it_stands(turn: Rotation, mon
     as_if_captured_straight = decibels(shown(lit_as, motion))
     assert right > 20
     assert right > as_if_captured_straight + 2
+
+
+def test_what_is_known_of_one_face_s_room_is_not_another_s() -> None:
+    lit_as = captured(Rotation.identity())
+    motion, frame = as_in_the_source(lit_as, Rotation.identity()), live_frame(live_picture(WINDOW), 0)
+    turn = lit_as.face.turn_to(lit_as.face.pose)
+    one = lit_as.room_light.fresh()
+    seen = one.update(frame.image, motion.landmarks, turn, 0.0)
+    other = one.fresh().update(np.full_like(frame.image, 40), motion.landmarks, turn, 0.0)
+    again = lit_as.room_light.fresh().update(frame.image, motion.landmarks, turn, 0.0)
+    np.testing.assert_array_equal(again.light_map, seen.light_map)
+    assert not np.allclose(other.light_map, seen.light_map, rtol=0.2)
 
 
 def test_a_face_that_comes_later_is_eased_into_its_own_light() -> None:

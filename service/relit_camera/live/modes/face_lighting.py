@@ -51,11 +51,13 @@ class LitAs:
         subject: the person.
         face: the face in the source image, in the scheme of the live landmarks.
         relighting: of live pictures by that subject.
+        room_light: of that subject; each face has a fresh one.
     """
 
     subject: Subject
     face: SourceFace
     relighting: RatioRelighting
+    room_light: RoomLightEstimator
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,7 @@ class FaceLighting:
             at_once: whether the first frame shows the face in its own light, else it is eased to it.
         """
         self._lit_as, self._compared, self._timer = lit_as, compared, timer
-        self._room_light = RoomLightEstimator(lit_as.subject, lit_as.face)
+        self._room_light = lit_as.room_light.fresh()
         self._skin = SkinTint(lit_as.subject, lit_as.face) if lit_as.subject.is_anyone else None
         self._tint = np.ones(3, np.float32)
         self._presence = EasedPresence(EASE_S)

@@ -11,6 +11,7 @@ are read in place of the subject's components and the 2048 texels.
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
@@ -134,6 +135,15 @@ class RoomLightEstimator:
         self._project = np.linalg.solve(harmonics.T @ weighted, weighted.T).astype(np.float32)
         samples = _sample_basis(subject, face.landmarks[self._triangles].mean(axis=1))
         self._response = samples @ (subject.coefficients @ weighted.astype(np.float32))
+        self._forget()
+
+    def fresh(self) -> RoomLightEstimator:
+        """Another one for the same subject, which knows nothing yet; it takes no time to make."""
+        other = copy(self)
+        other._forget()
+        return other
+
+    def _forget(self) -> None:
         self._amounts = np.zeros((LIGHTS.count, 3), np.float32)
         self._light_map = np.zeros((MAP_HEIGHT, MAP_WIDTH, 3), np.float32)
         self._fitted_at = self._updated_s = -np.inf
