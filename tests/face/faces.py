@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from relit_camera.base.rotations import rotation_from_angles
+from relit_camera.face.detection.face_detector import Detection
 from relit_camera.face.face_state import FaceState, FaceStatus
 from relit_camera.face.head_pose import HeadPose, project
 from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme, landmark_scheme
+from relit_camera.face.landmarks.rotated_crop import Crop, bounding_box
 
 SIZE = (640, 480)
 RATE = 30.0
@@ -52,3 +54,18 @@ def face(
         eyes=SCHEME.eyes_opening(landmarks),
         mouth=SCHEME.mouth_opening(landmarks),
     )
+
+
+class BoxCrops:
+    """The crops of a stand-in for a landmark network: upright boxes."""
+
+    scheme = SCHEME
+    threshold = 0.5
+
+    def crop_from_detection(self, detection: Detection) -> Crop:
+        x, y, width, height = detection.box
+        return Crop((x + width / 2, y + height / 2), width, height)
+
+    def crop_from_points(self, points: np.ndarray) -> Crop:
+        x, y, width, height = bounding_box(points)
+        return Crop((x + width / 2, y + height / 2), width, height)

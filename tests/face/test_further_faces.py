@@ -14,17 +14,14 @@ from relit_camera.face.landmarks.rotated_crop import Crop, bounding_box
 from relit_camera.face.motion.face_follower import FaceFollower, FaceMotion
 from relit_camera.face.tracking.further_faces import TUNABLES, FurtherFaces
 from relit_camera.face.tracking.landmark_tracker import LandmarkPrediction, LandmarkTracker
-from tests.face.faces import SCHEME, SIZE, face
+from tests.face.faces import SCHEME, SIZE, BoxCrops, face
 
 IMAGE = np.random.default_rng(0).integers(0, 255, (SIZE[1], SIZE[0], 3)).astype(np.uint8)
 PLACES = {"first": (0, 0, -80), "left": (-24, 2, -95), "right": (24, 2, -100), "behind": (-12, 18, -150)}
 
 
-class Crowd(FaceDetector):
+class Crowd(BoxCrops, FaceDetector):
     """Who is there, and a detector and a network that see them."""
-
-    scheme = SCHEME
-    threshold = 0.5
 
     def __init__(self, *names: str) -> None:
         self.points = {name: face(at=PLACES[name]).landmarks for name in names}
@@ -36,14 +33,6 @@ class Crowd(FaceDetector):
 
     def _faces_in_surroundings(self, region: DisplayImage) -> list[Detection]:
         return []  # it has to look at the whole picture
-
-    def crop_from_detection(self, detection: Detection) -> Crop:
-        x, y, width, height = detection.box
-        return Crop((x + width / 2, y + height / 2), width, height)
-
-    def crop_from_points(self, points: np.ndarray) -> Crop:
-        x, y, width, height = bounding_box(points)
-        return Crop((x + width / 2, y + height / 2), width, height)
 
     def read(self, image: np.ndarray, crop: Crop) -> LandmarkPrediction:
         """The face nearest to the crop; nobody where it is far off."""

@@ -10,7 +10,7 @@ from relit_camera.face.detection.face_detector import Box, Detection, is_same_fa
 from relit_camera.face.face_state import LOST, FaceStatus
 from relit_camera.face.landmarks.rotated_crop import Crop, bounding_box
 from relit_camera.face.tracking.landmark_tracker import LandmarkPrediction, LandmarkTracker
-from tests.face.faces import SCHEME, SIZE, face
+from tests.face.faces import SCHEME, SIZE, BoxCrops, face
 
 FACE = face(at=(0, 0, -80)).landmarks
 EYE_SPAN = SCHEME.eye_span(FACE)
@@ -25,23 +25,12 @@ class World:
         self.detectable = True
 
 
-class FakeNetwork:
+class FakeNetwork(BoxCrops):
     """Right when the crop is about right; else as sure of itself, and wrong by what the crop is off."""
-
-    scheme = SCHEME
-    threshold = 0.5
 
     def __init__(self, world: World) -> None:
         self.world = world
         self.reads = 0
-
-    def crop_from_detection(self, detection: Detection) -> Crop:
-        x, y, width, height = detection.box
-        return Crop((x + width / 2, y + height / 2), width, height)
-
-    def crop_from_points(self, points: np.ndarray) -> Crop:
-        x, y, width, height = bounding_box(points)
-        return Crop((x + width / 2, y + height / 2), width, height)
 
     def read(self, image: np.ndarray, crop: Crop) -> LandmarkPrediction:
         self.reads += 1

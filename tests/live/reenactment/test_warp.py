@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from relit_camera.live.reenactment.warp import Box, FixedBorder, FlowPatch, Warp, sample_points
+from relit_camera.base.images.image_types import Box
+from relit_camera.live.reenactment.warp import FixedBorder, FlowPatch, Warp, sample_points
 
 SIMILARITY = np.array([[0.7 * np.cos(0.3), -0.7 * np.sin(0.3), 36.0], [0.7 * np.sin(0.3), 0.7 * np.cos(0.3), -16.0]])
 WHOLE = (0, 0, 320, 240)

@@ -35,6 +35,9 @@ Points = NDArray[np.float32]
 Flow = NDArray[np.float32]
 """(height, width, 2) float32 backward flow (dx, dy) in pixels: out(x) = in(x + flow(x))."""
 
+Box = tuple[int, int, int, int]
+"""Left, top, right and bottom of a part of a picture, in pixels or cells."""
+
 
 @dataclass(frozen=True)
 class Frame:

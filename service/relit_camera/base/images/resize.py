@@ -8,13 +8,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.base.images.image_types import Box, DisplayImage
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
 
-Box = tuple[int, int, int, int]
-"""Left, top, right and bottom, in pixels."""
 MIDDLE = (0.5, 0.5)
 
 

@@ -16,10 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.base.images.image_types import DisplayImage
-
-Box = tuple[int, int, int, int]
-"""Left, top, right and bottom, in pixels."""
+from relit_camera.base.images.image_types import Box, DisplayImage
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """The faces in a picture besides the one that the camera is for, each followed by a tracker of its own.
 
-They share the networks of the camera's tracker. That is looked for by each in its place: whoever hides their face for a
+They share the networks of the camera's tracker. Each face is looked for in its own place: whoever hides theirs for a
 moment is not taken for the person beside them.
 """
 
@@ -44,7 +44,7 @@ class FurtherFacesTunables:
 TUNABLES = FurtherFacesTunables()
 
 
-class _Further:
+class _FollowedFace:
     """One of them."""
 
     def __init__(self, tracker: LandmarkTracker, follower: FaceFollower, frame: Frame, found: Detection) -> None:
@@ -92,7 +92,7 @@ class FurtherFaces:
         """
         self._tracker = tracker if isinstance(tracker, LandmarkTracker) else None
         self._make_follower = make_follower
-        self._faces: dict[int, _Further] = {}
+        self._faces: dict[int, _FollowedFace] = {}
         self._count = self._frames = 0
         self._looked_s = self._first_s = self._time_s = float("-inf")
 
@@ -169,7 +169,7 @@ class FurtherFaces:
             if there and there[0].is_lost:
                 there[0].take(frame, detection)
             elif not there and len(self._faces) < TUNABLES.most:
-                face = _Further(tracker.beside(), self._make_follower(), frame, detection)
+                face = _FollowedFace(tracker.beside(), self._make_follower(), frame, detection)
                 if not face.is_lost:
                     self._count += 1
                     self._faces[self._count] = face

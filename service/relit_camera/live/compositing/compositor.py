@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from relit_camera.base.config.look import BlurBackground, NoBackground
 from relit_camera.base.errors import ModelError
-from relit_camera.base.images.image_types import Alpha, DisplayImage, Frame
+from relit_camera.base.images.image_types import Alpha, Box, DisplayImage, Frame
 from relit_camera.face.matting import Matting
 from relit_camera.live.compositing.alpha_compositing import NEIGHBORHOOD, over, replace_room, split_alpha
 from relit_camera.live.compositing.background_renderer import (
@@ -89,7 +89,7 @@ class Compositor:
             return None  # better the room is relit than somebody who is there is not
         return np.maximum(matte, _sure_alpha(person, frame.size))
 
-    def needed(self, alpha: Alpha, scene: Scene) -> tuple[int, int, int, int]:
+    def needed(self, alpha: Alpha, scene: Scene) -> Box:
         """Left, top, right and bottom of what `composite_live` looks at of a picture of people with this alpha.
 
         Before another background that is more than they fill: it is told from what is near what shines through.

@@ -21,12 +21,14 @@ class CutTunables:
         headroom: height of the middle of the face above the cut's, in heights of the cut.
         still: the face may be off its place by so much of the cut before the cut moves.
         time_s: time constant with which it does.
+        arrived: nearer to its place than this, in shares of the frame, it is there.
         gap_s: after so long without a frame it goes there at once.
     """
 
     headroom: float = 0.08
     still: float = 0.1
     time_s: float = 0.8
+    arrived: float = 5e-4
     gap_s: float = 1.0
 
 
@@ -61,7 +63,11 @@ class FaceCut:
                 self._goal = wanted
         if self._middle is None:
             return MIDDLE
-        self._middle = self._middle + (self._goal - self._middle) * (1 - np.exp(-max(passed, 0.0) / TUNABLES.time_s))
+        way = self._goal - self._middle
+        if np.abs(way).max() < TUNABLES.arrived:
+            self._middle = self._goal
+        else:
+            self._middle = self._middle + way * (1 - np.exp(-max(passed, 0.0) / TUNABLES.time_s))
         return float(self._middle[0]), float(self._middle[1])
 
 

@@ -14,12 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.images.color import linear_from_uint8
-from relit_camera.base.images.image_types import DisplayImage, Frame
+from relit_camera.base.images.image_types import Box, DisplayImage, Frame
 from relit_camera.base.images.light_multiplication import POWER, light_of_root, multiply_light, root_of_light
 from relit_camera.base.images.temporal_noise import TemporalNoiseFilter
 from relit_camera.live.modes.live_detail import live_cells, noise_fraction
 from relit_camera.live.modes.ratio_relighting import FaceCells, FaceLight, RatioRelighting, cell_side
-from relit_camera.live.reenactment.warp import Box
 
 EXTRAPOLATION_CELLS, WIDE_REDUCTION = 45, 4
 """The extrapolation beyond the person is computed for so many there, and its wide blurs for fewer by a factor."""

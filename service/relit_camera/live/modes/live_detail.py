@@ -18,9 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.images.color import linear_from_uint8
-from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.base.images.image_types import Box, DisplayImage
 from relit_camera.base.images.light_multiplication import POWER, light_of_root, root_of_light
-from relit_camera.live.reenactment.warp import Box
 
 Cells = NDArray[np.float32]
 

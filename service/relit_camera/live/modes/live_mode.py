@@ -27,7 +27,7 @@ REST_S = 0.3
 
 
 @dataclass(frozen=True)
-class _Further:
+class _LitFurtherFace:
     """What is known of a further face, and of what frame: its motion there, where that was cut, and how it is relit."""
 
     lighting: FaceLighting
@@ -57,7 +57,7 @@ class LiveMode:
         self._compared = context.open_scene_relighting(first.relighting.subject, first.relighting.face)
         self._first = FaceLighting(first, self._compared, context.timer)
         self._as_anyone: LitAs | None = None
-        self._others: dict[int, _Further] = {}
+        self._others: dict[int, _LitFurtherFace] = {}
         self._frames = FrameRelighting()
         self._cut = FaceCut(context.size)
         self._told = False
@@ -125,11 +125,11 @@ class LiveMode:
                 relighting = self._as_anyone.relighting
                 compared = context.open_scene_relighting(relighting.subject, relighting.face)
                 first_frame = self._rest is None
-                known = _Further(FaceLighting(self._as_anyone, compared, context.timer, at_once=first_frame))
+                known = _LitFurtherFace(FaceLighting(self._as_anyone, compared, context.timer, at_once=first_frame))
             if known.motion is not motion or known.middle != middle:
                 fitted = fit_motion(motion, filmed_size, context.size, middle)
                 plan = known.lighting.update(fitted, live, scene, quality).plan
-                known = _Further(known.lighting, motion, middle, plan)
+                known = _LitFurtherFace(known.lighting, motion, middle, plan)
             self._others[number] = known
         return tuple(each.plan for each in self._others.values() if each.plan is not None)
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.images.color import LUMINANCE
-from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage
+from relit_camera.base.images.image_types import Box, DisplayImage, Frame, LinearImage
 from relit_camera.base.images.light_multiplication import root_of_light
 from relit_camera.face.head_pose import HeadPose
 from relit_camera.face.motion.face_follower import FaceMotion
@@ -33,7 +33,7 @@ from relit_camera.live.reenactment.dense_motion import DenseMotion
 from relit_camera.live.reenactment.first_order_reenactor import face_and_head_flow
 from relit_camera.live.reenactment.mesh.face_mesh import triangulate_face
 from relit_camera.live.reenactment.source_image import SourceFace, feather_edges, half_size_face
-from relit_camera.live.reenactment.warp import Box, PositionGrid, Warp
+from relit_camera.live.reenactment.warp import PositionGrid, Warp
 from relit_camera.subject.half_size import half_size_subject
 from relit_camera.subject.subject import Subject
 

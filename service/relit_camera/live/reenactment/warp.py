@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.easing import smoothstep
-from relit_camera.base.images.image_types import Flow
+from relit_camera.base.images.image_types import Box, Flow
 
-Box = tuple[int, int, int, int]
 Picture = TypeVar("Picture", NDArray[np.uint8], NDArray[np.float32])
 
 

@@ -12,13 +12,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.base.images.image_types import LinearImage, RgbaImage
+from relit_camera.base.images.image_types import Box, LinearImage, RgbaImage
 from relit_camera.base.images.tone_mapping import display_from_linear
 from relit_camera.live.reenactment.mesh.eye_mesh import EyeMesh
 from relit_camera.live.reenactment.mesh.face_mesh import SurfacePatch
 from relit_camera.live.reenactment.mesh.triangle_drawing import draw_triangles
 from relit_camera.live.reenactment.source_image import UPSAMPLING
-from relit_camera.live.reenactment.warp import Box
 
 REACH = 0.15
 """Of an eye's width beside its lids, over which what is drawn fades out."""

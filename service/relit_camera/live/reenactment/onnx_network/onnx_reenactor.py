@@ -16,7 +16,7 @@ from relit_camera.base.easing import smoothstep
 from relit_camera.base.errors import InputError
 from relit_camera.base.images.affine import opencv_affine
 from relit_camera.base.images.color import linear_from_uint8, srgb_decode, uint8_from_linear
-from relit_camera.base.images.image_types import Frame, LinearImage, Mask, RgbaImage
+from relit_camera.base.images.image_types import Box, Frame, LinearImage, Mask, RgbaImage
 from relit_camera.base.images.tone_mapping import display_from_linear
 from relit_camera.face.landmarks.rotated_crop import Crop
 from relit_camera.face.motion.face_follower import FaceMotion
@@ -26,7 +26,6 @@ from relit_camera.live.reenactment.onnx_network.onnx_contract import NetworkOutp
 from relit_camera.live.reenactment.reenactor import ReenactorContext, WarpedLayer, WarpTask
 from relit_camera.live.reenactment.source_image import Cutout
 from relit_camera.live.reenactment.warp import (
-    Box,
     FixedBorder,
     FlowPatch,
     Patch,

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.easing import smoothstep
-from relit_camera.base.images.image_types import LinearImage, RgbaImage
+from relit_camera.base.images.image_types import Box, LinearImage, RgbaImage
 from relit_camera.base.images.light_multiplication import multiply_light
 from relit_camera.base.rotations import Rotation, angles_from_rotation
 from relit_camera.face.head_pose import HeadPose
@@ -28,7 +28,7 @@ from relit_camera.live.reenactment.stills.still_regions import (
     still_regions,
 )
 from relit_camera.live.reenactment.stills.still_weights import Doing, StillWeights
-from relit_camera.live.reenactment.warp import Box, PositionGrid
+from relit_camera.live.reenactment.warp import PositionGrid
 from relit_camera.subject.expression_stills import ExpressionStill
 from relit_camera.subject.subject import Subject
 
